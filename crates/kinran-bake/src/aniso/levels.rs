@@ -1,0 +1,253 @@
+//! The mip chain of a surface, level by level, band by band.
+
+use std::marker::PhantomData;
+
+use glam::vec3;
+use rayon::prelude::*;
+
+use kinran_image::{full_level_count, level_size};
+use kinran_shading::Sym2;
+
+use super::footprint::{Kernel, Taps, footprints};
+use super::maps::{SurfaceMaps, TexelSpan, clamp_roughness};
+use super::moments::{LeanFilter, LinearFilter, MOMENTS, MomentFilter, NaiveFilter};
+use super::{ml, param};
+use crate::mips::{BAND_ROWS, PlaneBand, PlaneRows, reduce_levels};
+
+/// How a footprint of level 0 becomes one texel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Filter {
+    /// Maximum-likelihood GGX: the single lobe under which the footprint's microfacets are most probable.
+    #[default]
+    Ml,
+    /// Average of SGGX matrices (the talk).
+    Linear,
+    /// SGGX parameter estimation (Heitz et al. 2015, section 4).
+    Param,
+    /// LEAN mapping, brought to GGX by `sigma = alpha / sqrt(2)`.
+    Lean,
+    /// Averages maps as if they were colours and renormalises normals: what engines do today.
+    Naive,
+}
+
+impl Filter {
+    /// All filters, best first.
+    pub const ALL: [Filter; 5] = [Filter::Ml, Filter::Linear, Filter::Param, Filter::Lean, Filter::Naive];
+
+    /// The name on the command line and in metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            Filter::Ml => "ml",
+            Filter::Linear => "linear",
+            Filter::Param => "param",
+            Filter::Lean => "lean",
+            Filter::Naive => "naive",
+        }
+    }
+}
+
+/// Some whole rows of one level.
+#[derive(Clone, Debug)]
+pub struct Band {
+    /// Level, 0 is the finest.
+    pub level: usize,
+    /// The level's width.
+    pub width: u32,
+    /// First row.
+    pub y0: u32,
+    /// Rows, [`BAND_ROWS`] except at the level's end.
+    pub rows: u32,
+    /// `width * rows` texels.
+    pub texels: TexelSpan,
+}
+
+/// Filters `maps` to a full mip chain and hands every band of every level to `consume`, in parallel; returns
+/// what it returned, in order, per level. Level 0 is passed as authored. The result does not depend on the
+/// number of threads.
+pub fn filter_levels<T: Send>(
+    maps: &SurfaceMaps,
+    filter: Filter,
+    kernel: Kernel,
+    consume: impl Fn(Band) -> T + Sync,
+) -> Vec<Vec<T>> {
+    let size = maps.size();
+    let finest = in_bands(size, 0, |mut band| {
+        let mut span = TexelSpan::default();
+        for row in 0..band.rows {
+            maps.decode_span(size, band.y0 + row, 0, size.0 as usize, &mut span);
+            band.texels.append(&span);
+        }
+        consume(band)
+    });
+    std::iter::once(finest).chain(coarser_levels(maps, filter, kernel, &consume)).collect()
+}
+
+/// [`filter_levels`] without level 0.
+pub fn coarser_levels<T: Send>(
+    maps: &SurfaceMaps,
+    filter: Filter,
+    kernel: Kernel,
+    consume: impl Fn(Band) -> T + Sync,
+) -> Vec<Vec<T>> {
+    match filter {
+        Filter::Linear => moment_levels::<LinearFilter, T>(maps, kernel, &consume),
+        Filter::Lean => moment_levels::<LeanFilter, T>(maps, kernel, &consume),
+        Filter::Naive => moment_levels::<NaiveFilter, T>(maps, kernel, &consume),
+        Filter::Ml => footprint_levels(maps, kernel, ml::fit_row, &consume),
+        Filter::Param => footprint_levels(maps, kernel, param::fit_row, &consume),
+    }
+}
+
+/// Runs `band` over a level in bands, in parallel.
+fn in_bands<T: Send>(size: (u32, u32), level: usize, band: impl Fn(Band) -> T + Sync) -> Vec<T> {
+    let (width, height) = (level_size(size.0, level), level_size(size.1, level));
+    (0..height.div_ceil(BAND_ROWS))
+        .into_par_iter()
+        .map(|i| {
+            let y0 = i * BAND_ROWS;
+            let rows = BAND_ROWS.min(height - y0);
+            band(Band { level, width, y0, rows, texels: TexelSpan::default() })
+        })
+        .collect()
+}
+
+/// Columns of level 0 decoded at a time: six arrays of this many floats stay in the first-level cache.
+const SPAN: usize = 512;
+
+/// Level 0 as the averages of a filter.
+struct MomentRows<'a, F> {
+    maps: &'a SurfaceMaps,
+    filter: PhantomData<F>,
+}
+
+impl<F: MomentFilter> PlaneRows for MomentRows<'_, F> {
+    const PLANES: usize = MOMENTS;
+
+    #[inline(always)]
+    fn add_row(&self, y: u32, weight: f32, sums: &mut [f32]) {
+        let size = self.maps.size();
+        let width = size.0 as usize;
+        let mut span = TexelSpan::default();
+        for x0 in (0..width).step_by(SPAN) {
+            self.maps.decode_span(size, y, x0 as u32, SPAN.min(width - x0), &mut span);
+            add_moments::<F>(&span, weight, sums, width, x0);
+        }
+    }
+}
+
+/// Levels by averages.
+fn moment_levels<F: MomentFilter, T: Send>(
+    maps: &SurfaceMaps,
+    kernel: Kernel,
+    consume: &(impl Fn(Band) -> T + Sync),
+) -> Vec<Vec<T>> {
+    let source = MomentRows::<F> { maps, filter: PhantomData };
+    reduce_levels(&source, maps.size(), kernel, maps.wrap, |planes| {
+        let mut texels = TexelSpan::default();
+        texels.resize(planes.width * planes.rows);
+        pulp::Arch::new().dispatch(ExtractBand::<F> {
+            planes: &planes,
+            texels: &mut texels,
+            filter: PhantomData,
+        });
+        consume(Band {
+            level: planes.level,
+            width: planes.width as u32,
+            y0: planes.y0 as u32,
+            rows: planes.rows as u32,
+            texels,
+        })
+    })
+}
+
+/// Turns the averages of a band into its texels.
+struct ExtractBand<'a, F> {
+    planes: &'a PlaneBand<'a>,
+    texels: &'a mut TexelSpan,
+    filter: PhantomData<F>,
+}
+
+impl<F: MomentFilter> pulp::WithSimd for ExtractBand<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let width = self.planes.width;
+        for (y, moments) in self.planes.samples.chunks_exact(width * MOMENTS).enumerate() {
+            extract_row::<F>(moments, width, y, self.texels);
+        }
+    }
+}
+
+/// Adds the weighted moments of a decoded span to the sums of its columns.
+#[inline(always)]
+fn add_moments<F: MomentFilter>(span: &TexelSpan, weight: f32, sums: &mut [f32], width: usize, x0: usize) {
+    let len = span.len();
+    let mut planes = sums.chunks_exact_mut(width).map(|plane| &mut plane[x0..x0 + len]);
+    let [Some(p0), Some(p1), Some(p2), Some(p3), Some(p4), Some(p5), Some(p6), Some(p7), Some(p8)] =
+        std::array::from_fn(|_| planes.next())
+    else {
+        return;
+    };
+    let (nx, ny, nz) = (&span.nx[..len], &span.ny[..len], &span.nz[..len]);
+    let (axx, axy, ayy) = (&span.axx[..len], &span.axy[..len], &span.ayy[..len]);
+    for i in 0..len {
+        let a = Sym2 { xx: axx[i], xy: axy[i], yy: ayy[i] };
+        let m = F::moments(vec3(nx[i], ny[i], nz[i]), a);
+        p0[i] += m[0] * weight;
+        p1[i] += m[1] * weight;
+        p2[i] += m[2] * weight;
+        p3[i] += m[3] * weight;
+        p4[i] += m[4] * weight;
+        p5[i] += m[5] * weight;
+        p6[i] += m[6] * weight;
+        p7[i] += m[7] * weight;
+        p8[i] += m[8] * weight;
+    }
+}
+
+/// Turns one row of averages into row `y` of a band.
+#[inline(always)]
+fn extract_row<F: MomentFilter>(moments: &[f32], width: usize, y: usize, texels: &mut TexelSpan) {
+    let plane = |k: usize| &moments[k * width..(k + 1) * width];
+    let (p0, p1, p2, p3, p4, p5) = (plane(0), plane(1), plane(2), plane(3), plane(4), plane(5));
+    let (p6, p7, p8) = (plane(6), plane(7), plane(8));
+    let range = y * width..(y + 1) * width;
+    let TexelSpan { nx, ny, nz, axx, axy, ayy, .. } = texels;
+    let (nx, ny, nz) = (&mut nx[range.clone()], &mut ny[range.clone()], &mut nz[range.clone()]);
+    let (axx, axy, ayy) = (&mut axx[range.clone()], &mut axy[range.clone()], &mut ayy[range]);
+    for i in 0..width {
+        let (n, a) = F::surface([p0[i], p1[i], p2[i], p3[i], p4[i], p5[i], p6[i], p7[i], p8[i]]);
+        (nx[i], ny[i], nz[i]) = (n.x, n.y, n.z);
+        (axx[i], axy[i], ayy[i]) = (a.xx, a.xy, a.yy);
+    }
+
+    clamp_roughness(axx, axy, ayy);
+}
+
+/// Levels fitted footprint by footprint from level 0.
+fn footprint_levels<T: Send>(
+    maps: &SurfaceMaps,
+    kernel: Kernel,
+    fit_row: impl Fn(&SurfaceMaps, &[Taps], &Taps, &mut TexelSpan) + Sync,
+    consume: &(impl Fn(Band) -> T + Sync),
+) -> Vec<Vec<T>> {
+    let size = maps.size();
+    let levels = full_level_count(size.0, size.1);
+    let columns = footprints(size.0, levels, kernel, maps.wrap[0]);
+    let rows = footprints(size.1, levels, kernel, maps.wrap[1]);
+    (1..levels)
+        .map(|level| {
+            let (columns, rows) = (&columns[level - 1], &rows[level - 1]);
+            in_bands(size, level, |mut band| {
+                let mut row = TexelSpan::default();
+                for y in band.y0..band.y0 + band.rows {
+                    row.resize(columns.len());
+                    fit_row(maps, columns, &rows[y as usize], &mut row);
+                    band.texels.append(&row);
+                }
+                consume(band)
+            })
+        })
+        .collect()
+}

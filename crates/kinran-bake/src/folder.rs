@@ -1,0 +1,887 @@
+//! A folder of authored maps, understood by the names that exporters give them.
+//!
+//! A name is taken apart at `_`, `-`, `.`, blanks and inner capitals, upper and lower case alike. Words
+//! that only say how the file was saved (`2K`, `1024`, `PNG`, `LOD0`, `16bit`, `map`) are left out, the words
+//! before them are the map's role, and what stands before the role is the material's name. A file called
+//! after its role alone belongs to the folder's material.
+//!
+//! | names, without separators | role | channels | written so by |
+//! |---|---|---|---|
+//! | `normal` `normals` `norm` `nor` `nrm` `normalmap` | `normal`, +Y assumed | RG | glTF, Megascans, 3dtextures.me |
+//! | … + `gl` `ogl` `opengl` | `normal`, +Y | RG | ambientCG, Poly Haven, Substance |
+//! | … + `dx` `directx` `d3d` | `normal`, −Y | RG | ambientCG, Poly Haven, Substance |
+//! | `roughness` `rough` `rgh` | `roughness` | R | all |
+//! | `gloss` `glossiness` `glossy` `smoothness` | `gloss` | R, one minus roughness | Megascans, Substance |
+//! | `glossu`, `glossv` (`glossinessu`, …) | `gloss-u`, `gloss-v` | R, along and across the direction | the talk |
+//! | `direction` `flow` `flowmap` `anisodirection` `anisotropydirection` | `direction` | RG a vector; grey an angle, whose span is asked for | Godot, the talk |
+//! | `anisotropyangle` `anisoangle` | `direction-angle` | R, 0 to 1 is a full turn | Substance |
+//! | `anisotropylevel` `anisolevel` | `anisotropy-level` | R, Adobe Standard Material: `alpha_t = min(1, alpha + level⁴)` | Substance |
+//! | `anisotropy` | `anisotropy` | RG direction, B strength | glTF (`KHR_materials_anisotropy`) |
+//! | `aniso` | `aniso` | RGB, an aniso texel | Kinran |
+//! | `albedo` `basecolor` `diffuse` `diff` `color` `col`, `…colour` | `color` | RGB, sRGB | all |
+//! | `ao` `occ` `occlusion` `ambientocclusion` `mixedao` | `occlusion` | R | all |
+//! | `metallic` `metalness` `metal` | `metallic` | R | all |
+//! | `orm` `arm` `occlusionroughnessmetallic` | `orm` | R occlusion, G roughness, B metallic | Unreal, Poly Haven, glTF, Substance |
+//! | `rma`, `mra` | `rma`, `mra` | in the order of the letters | Unreal |
+//! | `metallicroughness` | `metallic-roughness` | G roughness, B metallic | glTF |
+//! | `metallicsmoothness` | `metallic-smoothness` | R metallic, A gloss | Unity |
+//! | `maskmap` | `mask-map` | R metallic, G occlusion, A gloss | Unity HDRP |
+//! | `n`, `r`, `d` `bc`, `m` | `normal`, `roughness`, `color`, `metallic` | as above; with Unreal's `T_` before, or beside another map of the same material | Unreal |
+//! | `height` `disp` `displacement` `bump`, `emissive`, `specular` `spec`, `opacity` `mask` | the same | not used | all |
+//!
+//! Nothing is guessed in silence. What can be read in two ways is a [`FolderError`] that names the files and
+//! the flag that settles it; what is assumed stands in the table ([`Folder::table`]).
+
+mod evidence;
+mod load;
+mod names;
+
+use std::collections::BTreeMap;
+use std::f32::consts::TAU;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use kinran_scene::Wrap;
+use serde::Serialize;
+
+pub use evidence::{GREEN_CONFIDENCE, GreenGuess, green_correlation, guess_green};
+pub use load::{LoadedMap, LoadedMaterial};
+pub use names::{Green, Role};
+
+/// Extensions of files that are read.
+const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "tga", "tif", "tiff", "exr", "hdr"];
+
+/// Roughness of a surface for which nothing gives any: the middle of the range, chosen by eye.
+pub const ASSUMED_ROUGHNESS: f32 = 0.5;
+
+/// What a person said by flags.
+#[derive(Clone, Debug)]
+pub struct Hints {
+    /// `--y-up`, `--y-down`: overrides names and texels.
+    pub green: Option<Green>,
+    /// `--direction-span`: radians that 1 stands for in a grey direction map (on the command line degrees,
+    /// 360 or 180).
+    pub direction_span: Option<f32>,
+    /// `--map ROLE=FILE`: a file by its name in the folder, or by a path; it wins over others of its role.
+    pub maps: Vec<(Role, PathBuf)>,
+    /// `--ignore FILE`: leave a file out, by its name in the folder.
+    pub ignore: Vec<PathBuf>,
+    /// `--roughness-is-gloss`: what is named roughness holds gloss.
+    pub roughness_is_gloss: bool,
+    /// `--roughness`: perceptual roughness where no map gives any, 0 to 1.
+    pub roughness: Option<f32>,
+    /// `--anisotropy`: strength as in `KHR_materials_anisotropy` where no map gives any, 0 to 1.
+    pub anisotropy: Option<f32>,
+    /// `--force-normal`: believe that a normal map is one, whatever its texels look like.
+    pub force_normal: bool,
+    /// What lies beyond the maps' borders.
+    pub wrap: [Wrap; 2],
+}
+
+impl Default for Hints {
+    fn default() -> Self {
+        Hints {
+            green: None,
+            direction_span: None,
+            maps: Vec::new(),
+            ignore: Vec::new(),
+            roughness_is_gloss: false,
+            roughness: None,
+            anisotropy: None,
+            force_normal: false,
+            wrap: [Wrap::Repeat; 2],
+        }
+    }
+}
+
+/// Why a folder could not be understood.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// A file or the folder could not be read.
+    #[error(transparent)]
+    Image(#[from] kinran_image::Error),
+    /// A file where a folder should be.
+    #[error("{}: this is not a folder; name the folder that holds the maps", .0.display())]
+    NotAFolder(PathBuf),
+    /// The folder has no map that the baker uses.
+    #[error(
+        "{}: no maps found; looked for {} files called …_normal, …_roughness, …_gloss, …_color, …_ARM and \
+         the like, saw {}; rename them, or name each with --map ROLE=FILE",
+        folder.display(), EXTENSIONS.join("/"), listed(seen)
+    )]
+    NoMaps {
+        /// The folder.
+        folder: PathBuf,
+        /// Names of the files that are there.
+        seen: Vec<String>,
+    },
+    /// Maps that can be read in more than one way.
+    #[error("material \"{material}\": {question}: {}; {fix}", listed(files))]
+    Ambiguous {
+        /// The material.
+        material: String,
+        /// What cannot be told.
+        question: String,
+        /// Names of the files in question.
+        files: Vec<String>,
+        /// The flags that settle it.
+        fix: String,
+    },
+    /// A file does not hold what its name says.
+    #[error("{}: {reason}; {fix}", path.display())]
+    Unfit {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+        /// What can be done.
+        fix: String,
+    },
+    /// A flag that cannot be.
+    #[error("{flag}: {reason}")]
+    Flag {
+        /// The flag and its value.
+        flag: String,
+        /// What is wrong, and what would be right.
+        reason: String,
+    },
+}
+
+/// Names for an error message: the first twelve, and how many more there are.
+fn listed(names: &[String]) -> String {
+    if names.is_empty() {
+        return "no files".into();
+    }
+    let shown = names[..names.len().min(12)].join(", ");
+    if names.len() > 12 { format!("{shown} and {} more", names.len() - 12) } else { shown }
+}
+
+/// A row of the table: a file and what was understood of it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Row {
+    /// The material; empty where the file belongs to none.
+    pub material: String,
+    /// The file's name; "-" for a constant.
+    pub file: String,
+    /// What it holds, where that was understood.
+    pub role: Option<Role>,
+    /// Which channels hold what; "-" where the file is not used.
+    pub channels: String,
+    /// What was assumed, chosen or left out, and why.
+    pub note: String,
+}
+
+/// A folder understood. Serializes as its rows, without paths.
+#[derive(Clone, Debug, Serialize)]
+pub struct Folder {
+    /// Every image file, material by material.
+    pub rows: Vec<Row>,
+    /// The materials, by name.
+    #[serde(skip)]
+    pub materials: Vec<MaterialMaps>,
+}
+
+/// One channel of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MapChannel {
+    /// The file.
+    pub file: PathBuf,
+    /// 0 to 3.
+    pub channel: usize,
+}
+
+/// How it is known which way green points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GreenSource {
+    /// The file's name says it.
+    Name,
+    /// A flag says it.
+    Flag,
+    /// Nothing does; +Y as in glTF.
+    Assumed,
+}
+
+/// A normal map.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NormalSource {
+    /// The file.
+    pub file: PathBuf,
+    /// Which way green points.
+    pub green: Green,
+    /// How that is known.
+    pub green_source: GreenSource,
+    /// Do not ask the texels whether this is a normal map.
+    pub force: bool,
+}
+
+/// Roughness without a direction.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BaseRoughness {
+    /// The same everywhere.
+    Constant(f32),
+    /// A map of perceptual roughness.
+    Roughness(MapChannel),
+    /// A map of gloss.
+    Gloss(MapChannel),
+}
+
+/// A direction map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DirectionSource {
+    /// The file.
+    pub file: PathBuf,
+    /// Radians that 1 stands for, where the map is an angle.
+    pub span: Option<f32>,
+    /// The name promises an angle; a coloured image is refused.
+    pub angle: bool,
+}
+
+/// How much a surface is stretched.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LevelSource {
+    /// Strength as in `KHR_materials_anisotropy`, the same everywhere.
+    Strength(f32),
+    /// A map with the level of the Adobe Standard Material.
+    Adobe(PathBuf),
+}
+
+/// Where the roughness comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RoughnessSource {
+    /// The same in all directions.
+    Isotropic(BaseRoughness),
+    /// Gloss along and across a direction.
+    GlossUv {
+        /// Along.
+        u: PathBuf,
+        /// Across.
+        v: PathBuf,
+        /// Along the tangent when absent.
+        direction: Option<DirectionSource>,
+    },
+    /// Roughness, how much it is stretched, and in which direction.
+    Level {
+        /// Across the direction.
+        base: BaseRoughness,
+        /// How much.
+        level: LevelSource,
+        /// Along the tangent when absent.
+        direction: Option<DirectionSource>,
+    },
+    /// Roughness and a texture of `KHR_materials_anisotropy`.
+    Khr {
+        /// Across the direction.
+        base: BaseRoughness,
+        /// Red and green direction, blue strength.
+        texture: PathBuf,
+    },
+    /// An aniso map.
+    Encoded(PathBuf),
+}
+
+/// The maps of one material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialMaps {
+    /// What its files have in common, or the folder's name.
+    pub name: String,
+    /// Normals.
+    pub normal: Option<NormalSource>,
+    /// Roughness; absent where neither it nor normals have a map.
+    pub roughness: Option<RoughnessSource>,
+    /// Base colour.
+    pub color: Option<PathBuf>,
+    /// Ambient occlusion.
+    pub occlusion: Option<MapChannel>,
+    /// Metalness.
+    pub metallic: Option<MapChannel>,
+    /// The files that are used and their roles, by role.
+    pub files: Vec<(Role, PathBuf)>,
+    /// What lies beyond the borders.
+    pub wrap: [Wrap; 2],
+}
+
+impl Folder {
+    /// The rows as aligned plain text with a heading, for people; ends with a newline.
+    pub fn table(&self) -> String {
+        let heading = ["material", "file", "role", "channels", "notes"].map(String::from);
+        let rows = self.rows.iter().map(|row| {
+            let role = row.role.map_or("-", Role::name).to_owned();
+            // A file name may hold anything, also what moves a terminal's cursor.
+            [row.material.clone(), row.file.clone(), role, row.channels.clone(), row.note.clone()]
+                .map(|cell| cell.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect())
+        });
+        let rows: Vec<[String; 5]> = std::iter::once(heading).chain(rows).collect();
+        let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max().unwrap_or(0);
+        let widths = [width(0), width(1), width(2), width(3)];
+
+        let mut text = String::new();
+        for row in &rows {
+            let mut line = String::new();
+            for (cell, width) in row.iter().zip(widths) {
+                line.push_str(&format!("{cell:width$}  "));
+            }
+            line.push_str(&row[4]);
+            text.push_str(line.trim_end());
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// A file on its way to being understood.
+struct Found {
+    path: PathBuf,
+    file: String,
+    name: names::Name,
+    role: Option<Role>,
+    /// A flag gave the role.
+    forced: bool,
+    /// Why the file is not used, if it is not.
+    dropped: Option<String>,
+    note: String,
+}
+
+impl Found {
+    fn is(&self, role: Role) -> bool {
+        self.role == Some(role) && self.dropped.is_none()
+    }
+}
+
+/// Finds the materials in a folder by the names of its image files. Does not look into folders in it, nor at
+/// hidden files; no image is read yet.
+///
+/// # Errors
+/// [`FolderError`]: the folder cannot be read or has no maps, a flag makes no sense, or maps can be read in
+/// more than one way.
+pub fn scan(folder: &Path, hints: &Hints) -> Result<Folder, FolderError> {
+    check_flags(hints)?;
+    let (mut found, others) = list(folder)?;
+    apply_flags(folder, hints, &mut found)?;
+    judge_letters(&mut found);
+
+    let (known, strangers): (Vec<Found>, Vec<Found>) = found.into_iter().partition(|f| f.role.is_some());
+    let mut groups: BTreeMap<String, Vec<Found>> = BTreeMap::new();
+    for file in known {
+        groups.entry(file.name.stem.to_lowercase()).or_default().push(file);
+    }
+
+    let mut result = Folder { rows: Vec::new(), materials: Vec::new() };
+    for mut files in groups.into_values() {
+        let name = match files[0].name.stem.as_str() {
+            "" => folder_name(folder),
+            stem => stem.to_owned(),
+        };
+        let material = understand(&name, &mut files, hints)?;
+        let constant = material.as_ref().and_then(constant_row);
+        result.rows.extend(files.into_iter().map(|file| row_of(&name, file)));
+        result.rows.extend(constant);
+        result.materials.extend(material);
+    }
+    result.rows.extend(strangers.into_iter().map(|file| row_of("", file)));
+
+    if result.materials.is_empty() {
+        let mut seen: Vec<String> = result.rows.into_iter().map(|row| row.file).chain(others).collect();
+        seen.sort();
+        return Err(FolderError::NoMaps { folder: folder.into(), seen });
+    }
+    Ok(result)
+}
+
+fn check_flags(hints: &Hints) -> Result<(), FolderError> {
+    for (flag, value) in [("--roughness", hints.roughness), ("--anisotropy", hints.anisotropy)] {
+        if let Some(value) = value.filter(|v| !(0.0..=1.0).contains(v)) {
+            return Err(FolderError::Flag { flag: format!("{flag} {value}"), reason: "give 0 to 1".into() });
+        }
+    }
+    if let Some(span) = hints.direction_span.filter(|s| !(*s > 0.0 && *s <= TAU + 1e-3)) {
+        let flag = format!("--direction-span {}", span.to_degrees());
+        return Err(FolderError::Flag { flag, reason: "give degrees above 0, at most 360".into() });
+    }
+    Ok(())
+}
+
+/// The image files by name, and the names of everything else that a person sees there.
+fn list(folder: &Path) -> Result<(Vec<Found>, Vec<String>), FolderError> {
+    let io = |e| FolderError::Image(kinran_image::Error::io(folder, e));
+    let entries = match fs::read_dir(folder) {
+        Err(e) if e.kind() == ErrorKind::NotADirectory => {
+            return Err(FolderError::NotAFolder(folder.into()));
+        }
+        other => other.map_err(io)?,
+    };
+    let (mut found, mut others) = (Vec::new(), Vec::new());
+    for entry in entries {
+        let path = entry.map_err(io)?.path();
+        let file = file_name(&path);
+        if file.starts_with('.') {
+            continue;
+        }
+        if is_image(&path) && !path.is_dir() {
+            found.push(found_file(path));
+        } else {
+            others.push(file);
+        }
+    }
+    found.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok((found, others))
+}
+
+fn is_image(path: &Path) -> bool {
+    path.extension().is_some_and(|e| EXTENSIONS.iter().any(|known| e.eq_ignore_ascii_case(known)))
+}
+
+fn found_file(path: PathBuf) -> Found {
+    let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = names::parse(&stem);
+    Found {
+        file: file_name(&path),
+        role: name.role,
+        name,
+        path,
+        forced: false,
+        dropped: None,
+        note: String::new(),
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+fn folder_name(folder: &Path) -> String {
+    let absolute = || fs::canonicalize(folder).ok();
+    let name = match folder.file_name() {
+        Some(name) => Some(name.to_os_string()),
+        None => absolute().and_then(|path| path.file_name().map(|n| n.to_os_string())),
+    };
+    name.map_or_else(|| "material".into(), |n| n.to_string_lossy().into_owned())
+}
+
+/// Gives files the roles that `--map` says, and takes out those that `--ignore` names.
+fn apply_flags(folder: &Path, hints: &Hints, found: &mut Vec<Found>) -> Result<(), FolderError> {
+    let position = |found: &[Found], path: &Path| {
+        found.iter().position(|f| f.path == path || f.path == folder.join(path))
+    };
+    for path in &hints.ignore {
+        let Some(at) = position(found, path) else {
+            let flag = format!("--ignore {}", path.display());
+            return Err(FolderError::Flag { flag, reason: "the folder has no such image file".into() });
+        };
+        found[at].role = None;
+        found[at].dropped = Some("left out by --ignore".into());
+    }
+    for (role, path) in &hints.maps {
+        let flag = || format!("--map {role}={}", path.display());
+        let at = match position(found, path) {
+            Some(at) => at,
+            None if path.is_file() => {
+                found.push(found_file(path.clone()));
+                found.len() - 1
+            }
+            None => {
+                let reason = "no such file, neither in the folder nor from here".into();
+                return Err(FolderError::Flag { flag: flag(), reason });
+            }
+        };
+        if found[at].forced {
+            let reason = "another --map names this file already".into();
+            return Err(FolderError::Flag { flag: flag(), reason });
+        }
+
+        // The material is the file's own, or the one whose name the file's name begins with, or the only one.
+        let mut stems: Vec<String> = Vec::new();
+        for other in found.iter().enumerate().filter(|(i, f)| *i != at && f.role.is_some()) {
+            let stem = &other.1.name.stem;
+            if !stems.iter().any(|s| s.eq_ignore_ascii_case(stem)) {
+                stems.push(stem.clone());
+            }
+        }
+        let own = found[at].name.stem.to_lowercase();
+        let known = stems.iter().any(|s| s.to_lowercase() == own);
+        if !known {
+            let prefix = stems.iter().filter(|s| !s.is_empty() && own.starts_with(&s.to_lowercase()));
+            let stem = match (prefix.max_by_key(|s| s.len()), stems.as_slice()) {
+                (Some(stem), _) | (None, [stem]) => stem.clone(),
+                (None, []) => String::new(),
+                (None, _) => {
+                    let reason = format!(
+                        "it cannot be told which of the materials {} it belongs to; begin its name with the \
+                         material's",
+                        listed(&stems)
+                    );
+                    return Err(FolderError::Flag { flag: flag(), reason });
+                }
+            };
+            found[at].name.stem = stem;
+        }
+        let green = found[at].name.green.filter(|_| found[at].role == Some(*role));
+        let file = &mut found[at];
+        file.name = names::Name { green, letter: false, unclear: false, ..file.name.clone() };
+        file.role = Some(*role);
+        file.forced = true;
+        file.dropped = None;
+        file.note = "by --map".into();
+    }
+    Ok(())
+}
+
+/// Takes the role from files of one or two letters that have neither Unreal's prefix nor company: another
+/// map of the same material with a whole word, or several letters with a normal map among them.
+fn judge_letters(found: &mut [Found]) {
+    let lonely: Vec<usize> = (0..found.len())
+        .filter(|&i| {
+            let file = &found[i];
+            if file.role.is_none() || !file.name.letter || file.name.unreal {
+                return false;
+            }
+            let stem = file.name.stem.to_lowercase();
+            let siblings: Vec<&Found> =
+                found.iter().filter(|f| f.role.is_some() && f.name.stem.to_lowercase() == stem).collect();
+            let word = siblings.iter().any(|f| !f.name.letter);
+            let normal = siblings.len() > 1 && siblings.iter().any(|f| f.role == Some(Role::Normal));
+            !word && !normal
+        })
+        .collect();
+    for i in lonely {
+        found[i].role = None;
+        found[i].note = "a letter alone is too little; --map ROLE=FILE says what it is".into();
+    }
+}
+
+fn row_of(material: &str, file: Found) -> Row {
+    let used = file.dropped.is_none() && file.role.is_some_and(Role::is_used);
+    let channels = if used { file.role.map_or("-", Role::channels) } else { "-" };
+    let note = match (&file.dropped, file.role) {
+        (Some(why), _) => format!("not used: {why}"),
+        (None, None) if file.note.is_empty() => "not recognised, not used".into(),
+        (None, None) => format!("not used: {}", file.note),
+        (None, Some(role)) if !role.is_used() => "not used".into(),
+        (None, Some(_)) => file.note,
+    };
+    Row { material: material.into(), file: file.file, role: file.role, channels: channels.into(), note }
+}
+
+/// The row of a roughness that no file gives.
+fn constant_row(material: &MaterialMaps) -> Option<Row> {
+    let base = match material.roughness.as_ref()? {
+        RoughnessSource::Isotropic(base)
+        | RoughnessSource::Level { base, .. }
+        | RoughnessSource::Khr { base, .. } => base,
+        _ => return None,
+    };
+    let BaseRoughness::Constant(value) = base else { return None };
+    Some(Row {
+        material: material.name.clone(),
+        file: "-".into(),
+        role: Some(Role::Roughness),
+        channels: "-".into(),
+        note: format!("no map: {value} everywhere; --roughness VALUE sets it"),
+    })
+}
+
+/// Makes a material of the files of one stem; none if nothing of them is used.
+fn understand(
+    material: &str,
+    files: &mut [Found],
+    hints: &Hints,
+) -> Result<Option<MaterialMaps>, FolderError> {
+    use Role::*;
+
+    // Which of the ways to say the same is meant.
+    settle_normals(material, files, hints)?;
+    let groups: [(&str, &[&[Role]]); 5] = [
+        (
+            "several maps say how the highlight is stretched",
+            &[&[Aniso], &[GlossU, GlossV], &[Anisotropy], &[AnisotropyLevel]],
+        ),
+        ("roughness is given twice", &[&[Aniso, GlossU, GlossV], &[Roughness, Gloss]]),
+        ("there are both roughness and gloss", &[&[Roughness], &[Gloss]]),
+        ("there are two direction maps", &[&[Direction], &[DirectionAngle]]),
+        ("the direction is given twice", &[&[Aniso, Anisotropy], &[Direction, DirectionAngle]]),
+    ];
+    for (question, alternatives) in groups {
+        settle(material, files, question, alternatives)?;
+    }
+    for role in [
+        Roughness,
+        Gloss,
+        GlossU,
+        GlossV,
+        Direction,
+        DirectionAngle,
+        AnisotropyLevel,
+        Anisotropy,
+        Aniso,
+        Color,
+        Occlusion,
+        Metallic,
+    ] {
+        settle_twins(material, files, |r| r == role, &format!("there are several {role} maps"))?;
+    }
+    settle_twins(material, files, Role::is_packed, "there are several packed maps")?;
+
+    let at = |files: &[Found], role: Role| files.iter().position(|f| f.is(role));
+    let path = |files: &[Found], role: Role| at(files, role).map(|i| files[i].path.clone());
+    let packed = files.iter().position(|f| f.dropped.is_none() && f.role.is_some_and(Role::is_packed));
+    let whole_roughness = at(files, Aniso).is_some() || at(files, GlossU).or(at(files, GlossV)).is_some();
+
+    // Scalars: a file of its own goes before a packed channel.
+    let mut unpacked: Vec<Role> = Vec::new();
+    let mut scalar = |files: &[Found], role: Role| -> Option<MapChannel> {
+        let in_pack = packed.and_then(|i| {
+            let channel = files[i].role?.packed_channel(role)?;
+            Some(MapChannel { file: files[i].path.clone(), channel })
+        });
+        match path(files, role) {
+            Some(file) => {
+                if in_pack.is_some() {
+                    unpacked.push(role);
+                }
+                Some(MapChannel { file, channel: 0 })
+            }
+            None => in_pack,
+        }
+    };
+    let occlusion = scalar(files, Occlusion);
+    let metallic = scalar(files, Metallic);
+    let mut roughness = scalar(files, Roughness);
+    let mut gloss = scalar(files, Gloss);
+    if roughness.is_some() && gloss.is_some() {
+        // One of them is packed: two files were settled above.
+        if at(files, Roughness).is_some() {
+            gloss = None;
+            unpacked.push(Gloss);
+        } else {
+            roughness = None;
+            unpacked.push(Roughness);
+        }
+    }
+    if whole_roughness {
+        unpacked.extend(roughness.take().map(|_| Roughness));
+        unpacked.extend(gloss.take().map(|_| Gloss));
+    }
+    if let (Some(i), false) = (packed, unpacked.is_empty()) {
+        let names: Vec<&str> = unpacked.iter().map(|r| r.name()).collect();
+        add_note(&mut files[i].note, &format!("its {} not used, another map has it", names.join(" and ")));
+    }
+
+    // Normals.
+    let normal = at(files, Normal).map(|i| {
+        let (green, green_source) = match (hints.green, files[i].name.green) {
+            (Some(green), _) => (green, GreenSource::Flag),
+            (None, Some(green)) => (green, GreenSource::Name),
+            (None, None) => (Green::Up, GreenSource::Assumed),
+        };
+        let sign = if green == Green::Up { "+Y" } else { "-Y" };
+        let how = match green_source {
+            GreenSource::Flag if files[i].name.green.is_some_and(|named| named != green) => {
+                format!("{sign} by flag, though its name says otherwise")
+            }
+            GreenSource::Flag => format!("{sign} by flag"),
+            GreenSource::Name => format!("{sign} by name"),
+            GreenSource::Assumed => format!("assumed {sign}"),
+        };
+        add_note(&mut files[i].note, &how);
+        NormalSource { file: files[i].path.clone(), green, green_source, force: hints.force_normal }
+    });
+
+    // Direction and level.
+    let direction = at(files, Direction).or(at(files, DirectionAngle)).map(|i| {
+        let angle = files[i].is(DirectionAngle);
+        let span = hints.direction_span.or(angle.then_some(TAU));
+        let how = match span {
+            Some(span) => format!("as an angle, 0 to 1 is {} degrees", span.to_degrees().round()),
+            None => "a vector in red and green; grey would need --direction-span".into(),
+        };
+        add_note(&mut files[i].note, &how);
+        DirectionSource { file: files[i].path.clone(), span, angle }
+    });
+    if let Some(i) = at(files, AnisotropyLevel) {
+        add_note(&mut files[i].note, "Adobe Standard Material: alpha along = alpha + level^4");
+    }
+
+    // Roughness.
+    let has_maps = normal.is_some()
+        || direction.is_some()
+        || roughness.is_some()
+        || gloss.is_some()
+        || whole_roughness
+        || at(files, Anisotropy).or(at(files, AnisotropyLevel)).is_some();
+    let base = match (roughness, gloss) {
+        (Some(map), _) if hints.roughness_is_gloss => {
+            if let Some(i) = files.iter().position(|f| f.path == map.file) {
+                add_note(&mut files[i].note, "its roughness is gloss, by flag");
+            }
+            BaseRoughness::Gloss(map)
+        }
+        (Some(map), _) => BaseRoughness::Roughness(map),
+        (None, Some(map)) => BaseRoughness::Gloss(map),
+        (None, None) => BaseRoughness::Constant(hints.roughness.unwrap_or(ASSUMED_ROUGHNESS)),
+    };
+    let unclear = files.iter().find(|f| f.is(Specular) && f.name.unclear);
+    if let Some(file) = unclear
+        && matches!(base, BaseRoughness::Constant(_))
+        && hints.roughness.is_none()
+        && has_maps
+        && !whole_roughness
+    {
+        return Err(FolderError::Ambiguous {
+            material: material.into(),
+            question: "no map is named roughness or gloss, and _spec can mean gloss or the specular color"
+                .into(),
+            files: vec![file.file.clone()],
+            fix: format!(
+                "say --map gloss={0} if it is gloss, --ignore {0} or --roughness VALUE if it is not",
+                file.file
+            ),
+        });
+    }
+    let source = if !has_maps {
+        None
+    } else if let Some(file) = path(files, Aniso) {
+        Some(RoughnessSource::Encoded(file))
+    } else if whole_roughness {
+        match (path(files, GlossU), path(files, GlossV)) {
+            (Some(u), Some(v)) => Some(RoughnessSource::GlossUv { u, v, direction }),
+            (u, _) => {
+                let (have, lack) = if u.is_some() { (GlossU, GlossV) } else { (GlossV, GlossU) };
+                return Err(FolderError::Ambiguous {
+                    material: material.into(),
+                    question: format!("there is a {have} map but no {lack} map"),
+                    files: at(files, have).map(|i| files[i].file.clone()).into_iter().collect(),
+                    fix: format!(
+                        "name the other with --map {lack}=FILE, or say --map gloss=FILE of this one"
+                    ),
+                });
+            }
+        }
+    } else if let Some(texture) = path(files, Anisotropy) {
+        Some(RoughnessSource::Khr { base, texture })
+    } else if let Some(file) = path(files, AnisotropyLevel) {
+        Some(RoughnessSource::Level { base, level: LevelSource::Adobe(file), direction })
+    } else if let Some(strength) = hints.anisotropy {
+        Some(RoughnessSource::Level { base, level: LevelSource::Strength(strength), direction })
+    } else if let Some(direction) = direction {
+        let file = file_name(&direction.file);
+        return Err(FolderError::Ambiguous {
+            material: material.into(),
+            question: "a direction map, but nothing says how strong the anisotropy is".into(),
+            fix: format!(
+                "say --anisotropy 0..1, name a map with --map anisotropy-level=FILE, or leave it out with \
+                 --ignore {file}"
+            ),
+            files: vec![file],
+        });
+    } else {
+        Some(RoughnessSource::Isotropic(base))
+    };
+
+    let color = path(files, Color);
+    if source.is_none() && color.is_none() && packed.is_none() && metallic.is_none() && occlusion.is_none() {
+        return Ok(None);
+    }
+    let mut used: Vec<(Role, PathBuf)> = files
+        .iter()
+        .filter(|f| f.dropped.is_none())
+        .filter_map(|f| f.role.filter(|r| r.is_used()).map(|role| (role, f.path.clone())))
+        .collect();
+    used.sort();
+    Ok(Some(MaterialMaps {
+        name: material.into(),
+        normal,
+        roughness: source,
+        color,
+        occlusion,
+        metallic,
+        files: used,
+        wrap: hints.wrap,
+    }))
+}
+
+fn add_note(note: &mut String, more: &str) {
+    if !note.is_empty() {
+        note.push_str("; ");
+    }
+    note.push_str(more);
+}
+
+/// Of several normal maps keeps the forced one, or of a pair that is told apart by its green the one asked
+/// for: +Y if nothing is said.
+fn settle_normals(material: &str, files: &mut [Found], hints: &Hints) -> Result<(), FolderError> {
+    let at: Vec<usize> = (0..files.len()).filter(|&i| files[i].is(Role::Normal)).collect();
+    if let [a, b] = at[..]
+        && let (Some(green_a), Some(green_b)) = (files[a].name.green, files[b].name.green)
+        && green_a != green_b
+        && !files[a].forced
+        && !files[b].forced
+    {
+        let wanted = hints.green.unwrap_or(Green::Up);
+        let (keep, drop) = if green_a == wanted { (a, b) } else { (b, a) };
+        files[drop].dropped = Some(format!("the same normals as {}", files[keep].file));
+        return Ok(());
+    }
+    settle_twins(material, files, |role| role == Role::Normal, "there are several normal maps")
+}
+
+/// Of several files of a kind keeps the one forced; an error if that is not exactly one.
+fn settle_twins(
+    material: &str,
+    files: &mut [Found],
+    kind: impl Fn(Role) -> bool,
+    question: &str,
+) -> Result<(), FolderError> {
+    let at: Vec<usize> = (0..files.len())
+        .filter(|&i| files[i].dropped.is_none() && files[i].role.is_some_and(&kind))
+        .collect();
+    if at.len() < 2 {
+        return Ok(());
+    }
+    let forced: Vec<usize> = at.iter().copied().filter(|&i| files[i].forced).collect();
+    let [keep] = forced[..] else {
+        return Err(ambiguous(material, files, question, &at));
+    };
+    for i in at.into_iter().filter(|&i| i != keep) {
+        files[i].dropped = Some(format!("--map names {}", files[keep].file));
+    }
+    Ok(())
+}
+
+/// Of groups of roles that exclude each other keeps the one with a forced file; an error if several are
+/// there and not exactly one of them is forced.
+fn settle(
+    material: &str,
+    files: &mut [Found],
+    question: &str,
+    alternatives: &[&[Role]],
+) -> Result<(), FolderError> {
+    let members = |files: &[Found], roles: &[Role]| -> Vec<usize> {
+        (0..files.len()).filter(|&i| roles.iter().any(|r| files[i].is(*r))).collect()
+    };
+    let groups: Vec<Vec<usize>> =
+        alternatives.iter().map(|roles| members(files, roles)).filter(|g| !g.is_empty()).collect();
+    if groups.len() < 2 {
+        return Ok(());
+    }
+    let forced: Vec<&Vec<usize>> = groups.iter().filter(|g| g.iter().any(|&i| files[i].forced)).collect();
+    let [keep] = forced[..] else {
+        return Err(ambiguous(material, files, question, &groups.concat()));
+    };
+    let why = format!("--map names {}", files[keep[0]].file);
+    for i in groups.iter().filter(|g| *g != keep).flatten() {
+        files[*i].dropped = Some(why.clone());
+    }
+    Ok(())
+}
+
+fn ambiguous(material: &str, files: &[Found], question: &str, at: &[usize]) -> FolderError {
+    let mut flags: Vec<String> =
+        at.iter().filter_map(|&i| Some(format!("--map {}={}", files[i].role?, files[i].file))).collect();
+    flags.dedup();
+    FolderError::Ambiguous {
+        material: material.into(),
+        question: question.into(),
+        files: at.iter().map(|&i| files[i].file.clone()).collect(),
+        fix: format!("say {}, or leave one out with --ignore FILE", flags.join(" or ")),
+    }
+}

@@ -1,0 +1,344 @@
+//! Maps of a material, read and brought into the form that the filters take.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use kinran_image::{Channels, Image, Pixels, read_image};
+use kinran_scene::Wrap;
+use kinran_shading::{alpha_from_roughness, alphas_from_khr_anisotropy};
+use rayon::prelude::*;
+
+use super::evidence::{green_correlation, guess_green, is_grey, not_normals};
+use super::{
+    BaseRoughness, DirectionSource, FolderError, Green, GreenGuess, GreenSource, LevelSource, MapChannel,
+    MaterialMaps, NormalSource, Role, RoughnessSource,
+};
+use crate::aniso::{DirectionMap, NormalMap, RoughnessMaps, ScalarMap, SurfaceMaps};
+use crate::channels::{Place, read_channel};
+
+/// A file that a material uses.
+#[derive(Clone, Debug)]
+pub struct LoadedMap {
+    /// What it holds.
+    pub role: Role,
+    /// Where it was read.
+    pub path: PathBuf,
+    /// Its samples.
+    pub image: Arc<Image>,
+}
+
+/// A material with its images in memory.
+#[derive(Clone, Debug)]
+pub struct LoadedMaterial {
+    /// Its name.
+    pub name: String,
+    /// Normals and roughness; absent where neither has a map.
+    pub surface: Option<SurfaceMaps>,
+    /// Every file that is used, those of the surface among them, by role.
+    pub images: Vec<LoadedMap>,
+    /// Occlusion: which of `images`, and its channel.
+    pub occlusion: Option<(usize, usize)>,
+    /// Metalness: which of `images`, and its channel.
+    pub metallic: Option<(usize, usize)>,
+    /// What the texels told that the names did not; sentences, each about a named file.
+    pub notes: Vec<String>,
+}
+
+/// Alphas along and across the direction, of a perceptual roughness and a level of anisotropy.
+type AlphaLaw = fn(f32, f32) -> (f32, f32);
+
+/// Images already read, by path.
+type Images = BTreeMap<PathBuf, Arc<Image>>;
+
+impl MaterialMaps {
+    /// Reads every map and checks that it holds what its name says. Maps may differ in size.
+    ///
+    /// # Errors
+    /// [`FolderError::Image`] where a file cannot be read; [`FolderError::Unfit`] where a normal map is none,
+    /// its unlabelled green clearly points down, or a direction or anisotropy map has not the channels it
+    /// needs.
+    pub fn load(&self) -> Result<LoadedMaterial, FolderError> {
+        let paths: BTreeSet<&PathBuf> = self.files.iter().map(|(_, path)| path).collect();
+        let images: Images = (paths.into_par_iter())
+            .map(|path| Ok((path.clone(), Arc::new(read_image(path)?))))
+            .collect::<Result<_, FolderError>>()?;
+        let loaded: Vec<LoadedMap> = (self.files.iter())
+            .map(|(role, path)| LoadedMap { role: *role, path: path.clone(), image: images[path].clone() })
+            .collect();
+        let place = |map: &MapChannel| Some((loaded.iter().position(|l| l.path == map.file)?, map.channel));
+        let (occlusion, metallic) =
+            (self.occlusion.as_ref().and_then(place), self.metallic.as_ref().and_then(place));
+        for map in [&self.occlusion, &self.metallic].into_iter().flatten() {
+            channel(&images, map)?;
+        }
+
+        let mut notes = Vec::new();
+        let surface = match &self.roughness {
+            None => None,
+            Some(source) => {
+                let normal = match &self.normal {
+                    Some(source) => normal_map(source, &images[&source.file], &mut notes)?,
+                    None => NormalMap::flat(),
+                };
+                let roughness = roughness_maps(source, &images, self.wrap)?;
+                Some(SurfaceMaps { normal, roughness, wrap: self.wrap })
+            }
+        };
+        Ok(LoadedMaterial { name: self.name.clone(), surface, images: loaded, occlusion, metallic, notes })
+    }
+}
+
+fn unfit(path: &Path, reason: impl Into<String>, fix: impl Into<String>) -> FolderError {
+    FolderError::Unfit { path: path.into(), reason: reason.into(), fix: fix.into() }
+}
+
+/// A normal map, after a look at its texels.
+fn normal_map(
+    source: &NormalSource,
+    image: &Arc<Image>,
+    notes: &mut Vec<String>,
+) -> Result<NormalMap, FolderError> {
+    let file = &source.file;
+    if !source.force
+        && let Some(reason) = not_normals(image)
+    {
+        return Err(unfit(
+            file,
+            format!("this is not a tangent-space normal map: {reason}"),
+            "name the right file with --map normal=FILE, or say --force-normal if it is one nevertheless",
+        ));
+    }
+
+    let guess = guess_green(image);
+    let name = super::file_name(file);
+    let correlation = green_correlation(image);
+    match (guess.contradicts(source.green), source.green_source) {
+        (true, GreenSource::Assumed) => {
+            return Err(unfit(
+                file,
+                format!(
+                    "its name does not say which way green points, and its slopes say downwards (correlation \
+                     {correlation:.2}, a +Y map is above 0)"
+                ),
+                "say --y-down if they are right (DirectX, Unreal), --y-up if they are not",
+            ));
+        }
+        (true, GreenSource::Name | GreenSource::Flag) => {
+            let (said, seen) = match source.green {
+                Green::Up => ("+Y", "-Y"),
+                Green::Down => ("-Y", "+Y"),
+            };
+            let by = if source.green_source == GreenSource::Name { "name" } else { "flag" };
+            notes.push(format!(
+                "{name}: taken as {said} by its {by}, though its slopes look like {seen} (correlation \
+                 {correlation:.2})"
+            ));
+        }
+        (false, GreenSource::Assumed) => notes.push(match guess {
+            GreenGuess::Unsure => {
+                format!("{name}: assumed +Y; its slopes do not tell, say --y-down if it is DirectX")
+            }
+            _ => format!("{name}: assumed +Y, and its slopes agree"),
+        }),
+        (false, _) => {}
+    }
+    Ok(NormalMap::new(image.clone(), source.green == Green::Down))
+}
+
+/// One channel of a map as it is.
+fn channel(images: &Images, map: &MapChannel) -> Result<ScalarMap, FolderError> {
+    let image = &images[&map.file];
+    let count = image.channels.count();
+    let lacks = if map.channel < 3 { map.channel > 0 && count < 3 } else { count % 2 == 1 };
+    if lacks {
+        let name = ["red", "green", "blue", "alpha"][map.channel];
+        return Err(unfit(
+            &map.file,
+            format!("it has no {name} channel, which should hold one of its quantities"),
+            "name what it holds with --map ROLE=FILE, or leave it out with --ignore FILE",
+        ));
+    }
+    // Grey with alpha keeps its alpha in the second channel.
+    let channel = if map.channel == 3 && count == 2 { 1 } else { map.channel };
+    if count == 2 && channel == 1 {
+        let alpha = second_channel(image);
+        return Ok(ScalarMap::channel(Arc::new(alpha), 0));
+    }
+    Ok(ScalarMap::channel(image.clone(), channel))
+}
+
+/// The alpha of a grey image, as a grey image.
+fn second_channel(image: &Image) -> Image {
+    fn odd<T: Copy>(v: &[T]) -> Vec<T> {
+        v.iter().skip(1).step_by(2).copied().collect()
+    }
+    let pixels = match &image.pixels {
+        Pixels::U8(v) => Pixels::U8(odd(v)),
+        Pixels::U16(v) => Pixels::U16(odd(v)),
+        Pixels::F32(v) => Pixels::F32(odd(v)),
+    };
+    Image { width: image.width, height: image.height, channels: Channels::R, pixels }
+}
+
+fn grey_file(images: &Images, file: &Path) -> ScalarMap {
+    ScalarMap::channel(images[file].clone(), 0)
+}
+
+fn roughness_maps(
+    source: &RoughnessSource,
+    images: &Images,
+    wrap: [Wrap; 2],
+) -> Result<RoughnessMaps, FolderError> {
+    Ok(match source {
+        RoughnessSource::Isotropic(base) => match base {
+            BaseRoughness::Constant(value) => RoughnessMaps::Isotropic(ScalarMap::constant(*value)),
+            BaseRoughness::Roughness(map) => RoughnessMaps::Isotropic(channel(images, map)?),
+            BaseRoughness::Gloss(map) => {
+                let gloss = channel(images, map)?;
+                RoughnessMaps::Gloss { u: gloss.clone(), v: gloss, direction: None }
+            }
+        },
+        RoughnessSource::GlossUv { u, v, direction } => RoughnessMaps::Gloss {
+            u: grey_file(images, u),
+            v: grey_file(images, v),
+            direction: direction_map(direction.as_ref(), images)?,
+        },
+        RoughnessSource::Level { base, level, direction } => {
+            let (level, law): (ScalarMap, AlphaLaw) = match level {
+                LevelSource::Strength(value) => (ScalarMap::constant(*value), alphas_from_khr_anisotropy),
+                LevelSource::Adobe(file) => (grey_file(images, file), alphas_from_adobe),
+            };
+            let (u, v) = gloss_pair(base, &level, law, images, wrap)?;
+            RoughnessMaps::Gloss { u, v, direction: direction_map(direction.as_ref(), images)? }
+        }
+        RoughnessSource::Khr { base, texture } => {
+            let image = &images[texture];
+            if is_grey(image) {
+                return Err(unfit(
+                    texture,
+                    "it is grey, but an anisotropy map of glTF has a direction in red and green",
+                    format!(
+                        "say --map anisotropy-level={0} if it is Substance's level, --map direction={0} if it \
+                         is a direction, or --ignore {0}",
+                        super::file_name(texture)
+                    ),
+                ));
+            }
+            let khr = |roughness| RoughnessMaps::Khr {
+                roughness,
+                strength: 1.0,
+                rotation: 0.0,
+                texture: Some(image.clone()),
+            };
+            match base {
+                BaseRoughness::Constant(value) => khr(ScalarMap::constant(*value)),
+                BaseRoughness::Roughness(map) => khr(channel(images, map)?),
+                BaseRoughness::Gloss(_) => {
+                    let strength = ScalarMap::channel(image.clone(), 2);
+                    let (u, v) = gloss_pair(base, &strength, alphas_from_khr_anisotropy, images, wrap)?;
+                    RoughnessMaps::Gloss { u, v, direction: Some(DirectionMap::Vector(image.clone())) }
+                }
+            }
+        }
+        RoughnessSource::Encoded(file) => {
+            if is_grey(&images[file]) {
+                return Err(unfit(
+                    file,
+                    "it is grey, but an aniso map has three different channels",
+                    format!("say what it is with --map ROLE=FILE, or --ignore {}", super::file_name(file)),
+                ));
+            }
+            RoughnessMaps::Encoded(images[file].clone())
+        }
+    })
+}
+
+/// Vector or angle, by whether the image is coloured; an angle needs its span.
+fn direction_map(
+    source: Option<&DirectionSource>,
+    images: &Images,
+) -> Result<Option<DirectionMap>, FolderError> {
+    let Some(source) = source else { return Ok(None) };
+    let image = &images[&source.file];
+    Ok(Some(match (is_grey(image), source.span) {
+        (true, Some(span)) => DirectionMap::Angle { map: ScalarMap::channel(image.clone(), 0), span },
+        (true, None) => {
+            return Err(unfit(
+                &source.file,
+                "it is a grey direction map, and nothing says whether white is a full or half a turn",
+                "say --direction-span 360 or --direction-span 180",
+            ));
+        }
+        (false, _) if source.angle => {
+            return Err(unfit(
+                &source.file,
+                "it is named an angle but is not grey",
+                format!(
+                    "say --map direction={} if red and green are a vector",
+                    super::file_name(&source.file)
+                ),
+            ));
+        }
+        (false, _) => DirectionMap::Vector(image.clone()),
+    }))
+}
+
+/// Principal alphas of the Adobe Standard Material, `alpha_b = roughness²`, `alpha_t = min(1, alpha_b +
+/// level⁴)` (Substance 3D Painter shader API, `lib-sampler`, ASM parametrisation).
+fn alphas_from_adobe(roughness: f32, level: f32) -> (f32, f32) {
+    let alpha_b = alpha_from_roughness(roughness);
+    ((alpha_b + level * level * level * level).min(1.0), alpha_b)
+}
+
+/// Gloss along and across the direction, texel by texel from a roughness and a level, at the larger of
+/// their sizes, in 16 bits; constants stay constants.
+fn gloss_pair(
+    base: &BaseRoughness,
+    level: &ScalarMap,
+    law: AlphaLaw,
+    images: &Images,
+    wrap: [Wrap; 2],
+) -> Result<(ScalarMap, ScalarMap), FolderError> {
+    let (base, is_gloss) = match base {
+        BaseRoughness::Constant(value) => (ScalarMap::constant(*value), false),
+        BaseRoughness::Roughness(map) => (channel(images, map)?, false),
+        BaseRoughness::Gloss(map) => (channel(images, map)?, true),
+    };
+    let glosses = |base: f32, level: f32| {
+        let roughness = if is_gloss { 1.0 - base } else { base };
+        let (alpha_t, alpha_b) = law(roughness, level);
+        (1.0 - alpha_t.sqrt(), 1.0 - alpha_b.sqrt())
+    };
+    let sources = [&base, level];
+    let size = sources
+        .iter()
+        .filter_map(|map| map.image.as_ref())
+        .fold((0, 0), |(w, h), (image, _)| (w.max(image.width), h.max(image.height)));
+    if size.0 == 0 {
+        let (u, v) = glosses(base.factor, level.factor);
+        return Ok((ScalarMap::constant(u), ScalarMap::constant(v)));
+    }
+
+    let mut rows = [vec![0.0f32; size.0 as usize], vec![0.0f32; size.0 as usize]];
+    let texels = size.0 as usize * size.1 as usize;
+    let (mut along, mut across) = (Vec::with_capacity(texels), Vec::with_capacity(texels));
+    let to_u16 = |v: f32| (v * 65535.0).round() as u16;
+    for y in 0..size.1 {
+        for (row, map) in rows.iter_mut().zip(sources) {
+            match &map.image {
+                None => row.fill(map.factor),
+                Some((image, channel)) => {
+                    read_channel(image, *channel, Place { size, y, x0: 0, wrap }, row);
+                }
+            }
+        }
+        for (base, level) in rows[0].iter().zip(&rows[1]) {
+            let (u, v) = glosses(base.clamp(0.0, 1.0), level.clamp(0.0, 1.0));
+            along.push(to_u16(u));
+            across.push(to_u16(v));
+        }
+    }
+    let image = |samples| Image::new(size.0, size.1, Channels::R, Pixels::U16(samples));
+    Ok((ScalarMap::channel(Arc::new(image(along)?), 0), ScalarMap::channel(Arc::new(image(across)?), 0)))
+}

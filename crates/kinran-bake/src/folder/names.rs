@@ -1,0 +1,479 @@
+//! What a file's name says about the map in it.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::Serialize;
+
+/// Which way green points in a normal map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Green {
+    /// +Y: glTF, OpenGL, Blender, Unity.
+    Up,
+    /// −Y: DirectX, Unreal.
+    Down,
+}
+
+/// What a map holds. The kebab-case name, as [`Display`](fmt::Display) writes it, is what `--map ROLE=FILE`
+/// takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// Tangent-space normals.
+    Normal,
+    /// Perceptual roughness.
+    Roughness,
+    /// One minus roughness.
+    Gloss,
+    /// Gloss along the direction.
+    GlossU,
+    /// Gloss across the direction.
+    GlossV,
+    /// Direction of the anisotropy: red and green a vector, or grey an angle.
+    Direction,
+    /// Direction as a grey angle, a full turn from 0 to 1 (Substance).
+    DirectionAngle,
+    /// Anisotropy level of the Adobe Standard Material (Substance).
+    AnisotropyLevel,
+    /// `KHR_materials_anisotropy`: red and green direction, blue strength.
+    Anisotropy,
+    /// An aniso map as Kinran writes it.
+    Aniso,
+    /// Base colour.
+    Color,
+    /// Ambient occlusion.
+    Occlusion,
+    /// Metalness.
+    Metallic,
+    /// Occlusion, roughness, metallic in red, green, blue.
+    Orm,
+    /// Roughness, metallic, occlusion in red, green, blue.
+    Rma,
+    /// Metallic, roughness, occlusion in red, green, blue.
+    Mra,
+    /// Roughness in green, metallic in blue (glTF).
+    MetallicRoughness,
+    /// Metallic in red, gloss in alpha (Unity).
+    MetallicSmoothness,
+    /// Metallic in red, occlusion in green, gloss in alpha (Unity HDRP).
+    MaskMap,
+    /// Height, displacement or bump.
+    Height,
+    /// Emitted light.
+    Emissive,
+    /// Specular level or colour.
+    Specular,
+    /// Coverage.
+    Opacity,
+}
+
+/// Every role, its name in flags and tables, and which channels hold what.
+const ROLES: [(Role, &str, &str); 23] = [
+    (Role::Normal, "normal", "RG normal"),
+    (Role::Roughness, "roughness", "R roughness"),
+    (Role::Gloss, "gloss", "R gloss"),
+    (Role::GlossU, "gloss-u", "R gloss along"),
+    (Role::GlossV, "gloss-v", "R gloss across"),
+    (Role::Direction, "direction", "RG vector, or grey angle"),
+    (Role::DirectionAngle, "direction-angle", "R angle"),
+    (Role::AnisotropyLevel, "anisotropy-level", "R level"),
+    (Role::Anisotropy, "anisotropy", "RG direction, B strength"),
+    (Role::Aniso, "aniso", "RGB aniso texel"),
+    (Role::Color, "color", "RGB color"),
+    (Role::Occlusion, "occlusion", "R occlusion"),
+    (Role::Metallic, "metallic", "R metallic"),
+    (Role::Orm, "orm", "R occlusion, G roughness, B metallic"),
+    (Role::Rma, "rma", "R roughness, G metallic, B occlusion"),
+    (Role::Mra, "mra", "R metallic, G roughness, B occlusion"),
+    (Role::MetallicRoughness, "metallic-roughness", "G roughness, B metallic"),
+    (Role::MetallicSmoothness, "metallic-smoothness", "R metallic, A gloss"),
+    (Role::MaskMap, "mask-map", "R metallic, G occlusion, A gloss"),
+    (Role::Height, "height", "-"),
+    (Role::Emissive, "emissive", "-"),
+    (Role::Specular, "specular", "-"),
+    (Role::Opacity, "opacity", "-"),
+];
+
+impl Role {
+    fn row(self) -> (Role, &'static str, &'static str) {
+        ROLES[self as usize]
+    }
+
+    /// Every role.
+    pub fn all() -> impl Iterator<Item = Role> {
+        ROLES.iter().map(|row| row.0)
+    }
+
+    /// Name in flags and tables.
+    pub fn name(self) -> &'static str {
+        self.row().1
+    }
+
+    /// Which channels hold what, for people; "-" where nothing of the map is used.
+    pub fn channels(self) -> &'static str {
+        self.row().2
+    }
+
+    /// Whether the baker does something with such a map.
+    pub fn is_used(self) -> bool {
+        self < Role::Height
+    }
+
+    /// Whether one file holds several quantities.
+    pub fn is_packed(self) -> bool {
+        (Role::Orm..=Role::MaskMap).contains(&self)
+    }
+
+    /// The channel of a packed map that holds `quantity`: occlusion, metallic, roughness or gloss.
+    pub(super) fn packed_channel(self, quantity: Role) -> Option<usize> {
+        use Role::{Gloss, Metallic, Occlusion, Roughness};
+        let channels: [Option<Role>; 4] = match self {
+            Role::Orm => [Some(Occlusion), Some(Roughness), Some(Metallic), None],
+            Role::Rma => [Some(Roughness), Some(Metallic), Some(Occlusion), None],
+            Role::Mra => [Some(Metallic), Some(Roughness), Some(Occlusion), None],
+            Role::MetallicRoughness => [None, Some(Roughness), Some(Metallic), None],
+            Role::MetallicSmoothness => [Some(Metallic), None, None, Some(Gloss)],
+            Role::MaskMap => [Some(Metallic), Some(Occlusion), None, Some(Gloss)],
+            _ => [None; 4],
+        };
+        channels.iter().position(|q| *q == Some(quantity))
+    }
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Role {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, String> {
+        ROLES.iter().find(|r| r.1 == s).map(|r| r.0).ok_or_else(|| {
+            let names: Vec<&str> = ROLES.iter().map(|r| r.1).collect();
+            format!("\"{s}\" is no kind of map; there are {}", names.join(", "))
+        })
+    }
+}
+
+/// A file name taken apart.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Name {
+    /// What is left of the role: the material's name. The whole name where no role was found; empty for a
+    /// file called after its role alone.
+    pub(super) stem: String,
+    /// The map.
+    pub(super) role: Option<Role>,
+    /// Which way green points, where the name tells.
+    pub(super) green: Option<Green>,
+    /// The role is one or two letters, which mean it only in company.
+    pub(super) letter: bool,
+    /// Begins with Unreal's `T_`.
+    pub(super) unreal: bool,
+    /// `_spec` may mean gloss as well as the specular colour.
+    pub(super) unclear: bool,
+}
+
+/// A run of letters and digits, at separators and inner capitals.
+struct Piece<'a> {
+    text: &'a str,
+    start: usize,
+    /// Begins within a word, at a capital.
+    camel: bool,
+}
+
+/// Words that say how a file was saved, not what it holds.
+fn is_noise(word: &str) -> bool {
+    let number = |s: &str| !s.is_empty() && s.len() <= 5 && s.bytes().all(|b| b.is_ascii_digit());
+    let side = |s: &str| number(s) && s.parse::<u32>().is_ok_and(|n| n >= 128 && n.is_power_of_two());
+    matches!(word, "png" | "jpg" | "jpeg" | "tga" | "tif" | "tiff" | "exr" | "hdr")
+        || matches!(
+            word,
+            "map" | "tex" | "texture" | "srgb" | "linear" | "raw" | "8bit" | "16bit" | "8b" | "16b"
+        )
+        || word.strip_suffix('k').is_some_and(number)
+        || word.strip_prefix("lod").is_some_and(number)
+        || side(word)
+        || word.split_once('x').is_some_and(|(w, h)| side(w) && side(h))
+}
+
+/// The role of a word in lower case without separators.
+fn role_of(word: &str) -> Option<(Role, Option<Green>)> {
+    let normal = ["normals", "normalmap", "normalbump", "normal", "norm", "nor", "nrml", "nrm"];
+    for base in normal {
+        match word.strip_prefix(base) {
+            Some("") => return Some((Role::Normal, None)),
+            Some("gl" | "ogl" | "opengl") => return Some((Role::Normal, Some(Green::Up))),
+            Some("dx" | "directx" | "d3d") => return Some((Role::Normal, Some(Green::Down))),
+            _ => {}
+        }
+    }
+    let role = match word {
+        "roughness" | "rough" | "rgh" => Role::Roughness,
+        "gloss" | "glossiness" | "glossy" | "smoothness" => Role::Gloss,
+        "glossu" | "glossinessu" => Role::GlossU,
+        "glossv" | "glossinessv" => Role::GlossV,
+        "direction"
+        | "flow"
+        | "flowmap"
+        | "anisodirection"
+        | "anisotropydirection"
+        | "anisotropicdirection" => Role::Direction,
+        "anisotropyangle" | "anisoangle" => Role::DirectionAngle,
+        "anisotropylevel" | "anisolevel" => Role::AnisotropyLevel,
+        "anisotropy" => Role::Anisotropy,
+        "aniso" => Role::Aniso,
+        "albedo" | "basecolor" | "basecolour" | "diffuse" | "diff" | "diffusecolor" | "color" | "colour"
+        | "col" => Role::Color,
+        "ao" | "occlusion" | "ambientocclusion" | "mixedao" | "occ" => Role::Occlusion,
+        "metallic" | "metalness" | "metal" => Role::Metallic,
+        "orm"
+        | "arm"
+        | "occlusionroughnessmetallic"
+        | "occlusionroughnessmetalness"
+        | "occlusionroughnessmetal" => Role::Orm,
+        "rma" => Role::Rma,
+        "mra" => Role::Mra,
+        "metallicroughness" => Role::MetallicRoughness,
+        "metallicsmoothness" => Role::MetallicSmoothness,
+        "maskmap" => Role::MaskMap,
+        "height" | "heightmap" | "disp" | "displacement" | "bump" => Role::Height,
+        "emissive" | "emission" => Role::Emissive,
+        "specular" | "specularlevel" | "specularcolor" | "specularcolour" | "spec" => Role::Specular,
+        "opacity" | "mask" | "alpha" | "transparency" => Role::Opacity,
+        _ => return None,
+    };
+    Some((role, None))
+}
+
+/// The role of Unreal's one and two letters.
+fn role_of_letter(word: &str) -> Option<Role> {
+    Some(match word {
+        "n" => Role::Normal,
+        "r" => Role::Roughness,
+        "d" | "bc" => Role::Color,
+        "m" => Role::Metallic,
+        "h" => Role::Height,
+        "e" => Role::Emissive,
+        "s" => Role::Specular,
+        _ => return None,
+    })
+}
+
+fn pieces(name: &str) -> Vec<Piece<'_>> {
+    let chars: Vec<(usize, char)> = name.char_indices().collect();
+    let mut out: Vec<Piece> = Vec::new();
+    let mut open: Option<(usize, usize, bool)> = None;
+    let mut close = |open: &mut Option<(usize, usize, bool)>, end: usize| {
+        if let Some((_, start, camel)) = open.take() {
+            out.push(Piece { text: &name[start..end], start, camel });
+        }
+    };
+    for (i, &(at, c)) in chars.iter().enumerate() {
+        if !c.is_alphanumeric() {
+            close(&mut open, at);
+            continue;
+        }
+        match open {
+            None => open = Some((i, at, false)),
+            Some((first, ..)) => {
+                let before = chars[i - 1].1;
+                let lower_follows = chars.get(i + 1).is_some_and(|(_, c)| c.is_lowercase());
+                // aB, ABc and 1Bc are boundaries; 2K and the s of sRGB are not.
+                let capital = c.is_uppercase()
+                    && (before.is_lowercase() && i - first > 1 || !before.is_lowercase() && lower_follows);
+                if capital {
+                    close(&mut open, at);
+                    open = Some((i, at, true));
+                }
+            }
+        }
+    }
+    close(&mut open, name.len());
+    out
+}
+
+/// Takes a file name without its extension apart.
+pub(super) fn parse(name: &str) -> Name {
+    let all = pieces(name);
+    let unreal = name.starts_with("T_") || name.starts_with("t_");
+    let lower: Vec<String> = all.iter().map(|p| p.text.to_lowercase()).collect();
+
+    let mut end = all.len();
+    let (begin, role, green, letter) = loop {
+        if end == 0 {
+            let whole = Name {
+                stem: name.to_owned(),
+                role: None,
+                green: None,
+                letter: false,
+                unreal,
+                unclear: false,
+            };
+            return whole;
+        }
+        // The longest name has four words: Normal Map Open GL. The longest match wins.
+        let found = (end.saturating_sub(4)..end).find_map(|begin| {
+            let (role, green) = role_of(&lower[begin..end].concat())?;
+            let word = &lower[begin];
+            let shouted = all[begin].text.chars().all(char::is_uppercase);
+            let camel_unsafe = word.len() <= 3 && !shouted || matches!(word.as_str(), "metal" | "mask");
+            let lonely = begin + 1 == end;
+            if all[begin].camel && lonely && camel_unsafe {
+                return None;
+            }
+            // "Metallic_Roughness" is the roughness of a material called Metallic, "x_metallic_roughness" is not.
+            let crosses = all[begin + 1..end].iter().any(|p| !p.camel);
+            if role.is_packed() && begin == 0 && crosses {
+                return None;
+            }
+            Some((begin, role, green, false))
+        });
+        let letter = || {
+            let begin = end - 1;
+            let role = role_of_letter(&lower[begin]).filter(|_| !all[begin].camel && begin > 0)?;
+            Some((begin, role, None, true))
+        };
+        if let Some(found) = found.or_else(letter) {
+            break found;
+        }
+        end = if is_noise(&lower[end - 1]) { end - 1 } else { 0 };
+    };
+
+    let mut last = begin;
+    while last > 0 && is_noise(&lower[last - 1]) {
+        last -= 1;
+    }
+    let first = usize::from(unreal && last > 0);
+    let stem = if last > first {
+        let piece = &all[last - 1];
+        name[all[first].start..piece.start + piece.text.len()].to_owned()
+    } else {
+        String::new()
+    };
+    let unclear = lower[begin] == "spec";
+    Name { stem, role: Some(role), green, letter, unreal, unclear }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn roles_stand_in_their_table_in_order() {
+        for (i, row) in ROLES.iter().enumerate() {
+            assert_eq!(row.0 as usize, i, "{row:?}");
+            assert_eq!(row.1.parse(), Ok(row.0), "{row:?}");
+        }
+    }
+
+    #[test]
+    fn stem_role_and_green_of_each_exporters_names() {
+        use Green::{Down, Up};
+        use Role::*;
+        let cases: &[(&str, &str, Role, Option<Green>)] = &[
+            // ambientCG
+            ("Metal009_2K-PNG_NormalGL", "Metal009", Normal, Some(Up)),
+            ("Metal009_2K-PNG_NormalDX", "Metal009", Normal, Some(Down)),
+            ("Metal009_2K-JPG_Color", "Metal009", Color, None),
+            ("Metal009_2K-JPG_Metalness", "Metal009", Metallic, None),
+            ("Bark014_1K_AmbientOcclusion", "Bark014", Occlusion, None),
+            ("Bark014_1K_Displacement", "Bark014", Height, None),
+            ("PaintedMetal004_4K-PNG_Roughness", "PaintedMetal004", Roughness, None),
+            // Poly Haven
+            ("rock_06_nor_gl_1k", "rock_06", Normal, Some(Up)),
+            ("brick_nor_dx_2k", "brick", Normal, Some(Down)),
+            ("rusty_metal_02_diff_4k", "rusty_metal_02", Color, None),
+            ("rusty_metal_02_metal_4k", "rusty_metal_02", Metallic, None),
+            ("rusty_metal_02_arm_4k", "rusty_metal_02", Orm, None),
+            ("rock_06_rough_1k", "rock_06", Roughness, None),
+            ("rock_06_ao_1k", "rock_06", Occlusion, None),
+            ("rock_06_disp_1k", "rock_06", Height, None),
+            ("rock_06_spec_1k", "rock_06", Specular, None),
+            // Substance
+            ("Lamp_Shade_Normal_OpenGL", "Lamp_Shade", Normal, Some(Up)),
+            ("Lamp_Shade_Normal_DirectX", "Lamp_Shade", Normal, Some(Down)),
+            ("DefaultMaterial_Anisotropy_angle", "DefaultMaterial", DirectionAngle, None),
+            ("DefaultMaterial_Anisotropy_level", "DefaultMaterial", AnisotropyLevel, None),
+            ("DefaultMaterial_anisotropyangle", "DefaultMaterial", DirectionAngle, None),
+            ("DefaultMaterial_anisotropylevel", "DefaultMaterial", AnisotropyLevel, None),
+            ("DefaultMaterial_Base_color", "DefaultMaterial", Color, None),
+            ("DefaultMaterial_Mixed_AO", "DefaultMaterial", Occlusion, None),
+            ("DefaultMaterial_Glossiness", "DefaultMaterial", Gloss, None),
+            ("DefaultMaterial_Specular_level", "DefaultMaterial", Specular, None),
+            ("foo_OcclusionRoughnessMetallic", "foo", Orm, None),
+            ("foo_MetallicSmoothness", "foo", MetallicSmoothness, None),
+            ("foo_MaskMap", "foo", MaskMap, None),
+            // glTF
+            ("wood_metallicRoughness", "wood", MetallicRoughness, None),
+            ("wood_occlusionRoughnessMetallic", "wood", Orm, None),
+            ("AnisotropyBarnLamp_occlusionroughnessmetal", "AnisotropyBarnLamp", Orm, None),
+            ("AnisotropyBarnLamp_anisotropy", "AnisotropyBarnLamp", Anisotropy, None),
+            ("wood_baseColor", "wood", Color, None),
+            ("wood_emissive", "wood", Emissive, None),
+            ("SheenChairFabricNormal", "SheenChairFabric", Normal, None),
+            // 3dtextures.me
+            ("Leather_008_ambientOcclusion", "Leather_008", Occlusion, None),
+            ("Leather_008_basecolor", "Leather_008", Color, None),
+            ("Ice_001_COLOR", "Ice_001", Color, None),
+            ("Ice_001_NORM", "Ice_001", Normal, None),
+            ("Ice_001_OCC", "Ice_001", Occlusion, None),
+            // Megascans
+            ("vbsjdjbs_4K_Normal_LOD0", "vbsjdjbs", Normal, None),
+            ("vbsjdjbs_4K_Gloss", "vbsjdjbs", Gloss, None),
+            ("vbsjdjbs_4K_Albedo", "vbsjdjbs", Color, None),
+            // Unreal
+            ("T_Brick_N", "Brick", Normal, None),
+            ("T_Brick_BC", "Brick", Color, None),
+            ("T_Brick_ORM", "Brick", Orm, None),
+            // Kinran, the talk, Godot
+            ("satin_GlossU", "satin", GlossU, None),
+            ("satin_gloss_v", "satin", GlossV, None),
+            ("satin_aniso_direction", "satin", Direction, None),
+            ("satin_aniso", "satin", Aniso, None),
+            ("aluminium_flow", "aluminium", Direction, None),
+            // names alone, other separators, noise behind
+            ("normal", "", Normal, None),
+            ("Base Color", "", Color, None),
+            ("_roughness", "", Roughness, None),
+            ("1k_normal", "", Normal, None),
+            ("my.fabric.roughness.2k", "my.fabric", Roughness, None),
+            ("Wood-Floor-Normal-1024x1024", "Wood-Floor", Normal, None),
+            ("WoodNormalMap", "Wood", Normal, None),
+            ("WoodAO", "Wood", Occlusion, None),
+            ("Metallic_Roughness", "Metallic", Roughness, None),
+            ("Fabric_ARM", "Fabric", Orm, None),
+        ];
+        for (name, stem, role, green) in cases {
+            let got = parse(name);
+            assert_eq!(
+                (got.stem.as_str(), got.role, got.green),
+                (*stem, Some(*role), *green),
+                "{name}: {got:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn words_that_merely_end_like_a_map_are_not_one() {
+        for name in [
+            "Metal009",
+            "SwordArm",
+            "RustyMetal",
+            "gold",
+            "world_map",
+            "flower",
+            "Kanor",
+            "",
+            "___",
+            "n",
+            "1k",
+        ] {
+            let got = parse(name);
+            assert_eq!(got.role, None, "{name}: {got:?}");
+            assert_eq!(got.stem, name);
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! Filters and solvers that turn authored maps into runtime textures.
+
+pub mod aniso;
+mod channels;
+pub mod folder;
+mod material;
+mod mips;
+
+pub use material::{MaterialSurface, NoSurface, material_surface};
+pub use mips::{
+    BAND_ROWS, Rgba8Level, bake_plain, linear_from_srgb, pack_channels, plain_levels, srgb_from_linear,
+};

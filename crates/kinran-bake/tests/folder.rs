@@ -1,0 +1,929 @@
+//! Folders of maps: names of each exporter, what must be asked, what must be refused.
+
+#![allow(clippy::print_stdout, reason = "tests say what they skip and measure")]
+
+use std::f32::consts::{PI, TAU};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use glam::{Vec2, vec2};
+use kinran_bake::aniso::{DirectionMap, RoughnessMaps, TexelSpan};
+use kinran_bake::folder::{
+    ASSUMED_ROUGHNESS, BaseRoughness, Folder, FolderError, GREEN_CONFIDENCE, Green, GreenGuess, GreenSource,
+    Hints, LoadedMaterial, MaterialMaps, Role, RoughnessSource, green_correlation, guess_green, scan,
+};
+use kinran_image::{Channels, Image, Pixels, read_image, write_png};
+use kinran_shading::ALPHA_MIN;
+use proptest::prelude::*;
+
+/// A folder of empty files; enough for scanning.
+fn folder_of(names: &[&str]) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    for name in names {
+        fs::write(dir.path().join(name), b"").unwrap();
+    }
+    dir
+}
+
+fn scanned(names: &[&str], hints: &Hints) -> Result<Folder, FolderError> {
+    scan(folder_of(names).path(), hints)
+}
+
+fn only(names: &[&str], hints: &Hints) -> MaterialMaps {
+    let folder = scanned(names, hints).unwrap_or_else(|e| panic!("{names:?}: {e}"));
+    assert_eq!(folder.materials.len(), 1, "{names:?}:\n{}", folder.table());
+    folder.materials.into_iter().next().unwrap()
+}
+
+fn refused(names: &[&str], hints: &Hints) -> String {
+    match scanned(names, hints) {
+        Err(e) => e.to_string(),
+        Ok(folder) => panic!("{names:?} was taken as\n{}", folder.table()),
+    }
+}
+
+fn file(path: &Path) -> String {
+    path.file_name().unwrap().to_string_lossy().into_owned()
+}
+
+fn maps(list: &[(Role, &str)]) -> Hints {
+    Hints { maps: list.iter().map(|(r, f)| (*r, f.into())).collect(), ..Hints::default() }
+}
+
+// Pictures
+
+fn image(side: u32, channels: Channels, texel: impl Fn(f32, f32) -> [f32; 4]) -> Image {
+    let mut samples = Vec::new();
+    for y in 0..side {
+        for x in 0..side {
+            let t = texel((x as f32 + 0.5) / side as f32, (y as f32 + 0.5) / side as f32);
+            samples.extend(t[..channels.count()].iter().map(|v| (v * 65535.0).round() as u16));
+        }
+    }
+    Image::new(side, side, channels, Pixels::U16(samples)).unwrap()
+}
+
+/// Normals of `h = a sin(2πk(x + y/2)) + a cos(2πky)`, y upwards: diagonal waves, so that the curl tells.
+fn waves(green: Green) -> Image {
+    image(64, Channels::Rgb, |u, v| {
+        let y = 1.0 - v;
+        let (a, k) = (0.02, 4.0);
+        let diagonal = a * TAU * k * (TAU * k * (u + y * 0.5)).cos();
+        let (dx, dy) = (diagonal, 0.5 * diagonal - a * TAU * k * (TAU * k * y).sin());
+        let length = (dx * dx + dy * dy + 1.0).sqrt();
+        let sign = if green == Green::Up { 1.0 } else { -1.0 };
+        let n = [-dx / length, -dy / length * sign, 1.0 / length];
+        [n[0] * 0.5 + 0.5, n[1] * 0.5 + 0.5, n[2] * 0.5 + 0.5, 1.0]
+    })
+}
+
+fn grey(value: f32) -> Image {
+    image(8, Channels::R, |_, _| [value; 4])
+}
+
+fn painted(files: &[(&str, &Image)]) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, image) in files {
+        write_png(&dir.path().join(name), image).unwrap();
+    }
+    dir
+}
+
+fn load_one(files: &[(&str, &Image)], hints: &Hints) -> Result<LoadedMaterial, FolderError> {
+    let dir = painted(files);
+    let folder = scan(dir.path(), hints)?;
+    assert_eq!(folder.materials.len(), 1, "{}", folder.table());
+    folder.materials[0].load()
+}
+
+/// The first texel's squared roughness: xx, xy, yy.
+fn first_texel(material: &LoadedMaterial) -> [f32; 3] {
+    let maps = material.surface.as_ref().expect("a surface");
+    let mut span = TexelSpan::default();
+    maps.decode_span(maps.size(), 0, 0, 1, &mut span);
+    [span.axx[0], span.axy[0], span.ayy[0]]
+}
+
+#[track_caller]
+fn assert_near(got: [f32; 3], alpha_t: f32, alpha_b: f32, axis: Vec2, what: &str) {
+    let (t, b) = (alpha_t * alpha_t, alpha_b * alpha_b);
+    let wanted = [
+        t * axis.x * axis.x + b * axis.y * axis.y,
+        (t - b) * axis.x * axis.y,
+        t * axis.y * axis.y + b * axis.x * axis.x,
+    ];
+    for (g, w) in got.iter().zip(wanted) {
+        assert!((g - w).abs() < 2e-4, "{what}: wanted {wanted:?} got {got:?}");
+    }
+}
+
+// Names
+
+#[test]
+fn whole_downloads_of_each_site_become_one_material() {
+    type Case<'a> = (&'a str, &'a [&'a str], &'a str, Green, GreenSource, &'a str);
+    use GreenSource::{Assumed, Name};
+    let cases: &[Case] = &[
+        (
+            "ambientCG",
+            &[
+                "Metal009.png",
+                "Metal009_2K-PNG.mtlx",
+                "Metal009_2K-PNG.usdc",
+                "Metal009_2K-PNG_Color.png",
+                "Metal009_2K-PNG_Displacement.png",
+                "Metal009_2K-PNG_Metalness.png",
+                "Metal009_2K-PNG_NormalDX.png",
+                "Metal009_2K-PNG_NormalGL.png",
+                "Metal009_2K-PNG_Roughness.png",
+            ],
+            "Metal009_2K-PNG_NormalGL.png",
+            Green::Up,
+            Name,
+            "Metal009_2K-PNG_Roughness.png",
+        ),
+        (
+            "Poly Haven",
+            &[
+                "rock_06_ao_1k.jpg",
+                "rock_06_arm_1k.jpg",
+                "rock_06_diff_1k.jpg",
+                "rock_06_disp_1k.png",
+                "rock_06_nor_gl_1k.exr",
+                "rock_06_rough_1k.exr",
+                "rock_06_spec_1k.png",
+            ],
+            "rock_06_nor_gl_1k.exr",
+            Green::Up,
+            Name,
+            "rock_06_rough_1k.exr",
+        ),
+        (
+            "Poly Haven, DirectX and packed alone",
+            &["brick_nor_dx_2k.png", "brick_arm_2k.png", "brick_diff_2k.png"],
+            "brick_nor_dx_2k.png",
+            Green::Down,
+            Name,
+            "brick_arm_2k.png",
+        ),
+        (
+            "Substance Painter",
+            &[
+                "Lamp_Shade_Base_color.png",
+                "Lamp_Shade_Metallic.png",
+                "Lamp_Shade_Normal_DirectX.png",
+                "Lamp_Shade_Normal_OpenGL.png",
+                "Lamp_Shade_Mixed_AO.png",
+                "Lamp_Shade_Roughness.png",
+                "Lamp_Shade_Height.png",
+            ],
+            "Lamp_Shade_Normal_OpenGL.png",
+            Green::Up,
+            Name,
+            "Lamp_Shade_Roughness.png",
+        ),
+        (
+            "Painter for glTF",
+            &[
+                "wood_baseColor.png",
+                "wood_normal.png",
+                "wood_occlusionRoughnessMetallic.png",
+                "wood_emissive.png",
+            ],
+            "wood_normal.png",
+            Green::Up,
+            Assumed,
+            "wood_occlusionRoughnessMetallic.png",
+        ),
+        (
+            "3dtextures.me",
+            &[
+                "Leather_008_ambientOcclusion.jpg",
+                "Leather_008_basecolor.jpg",
+                "Leather_008_height.png",
+                "Leather_008_normal.jpg",
+                "Leather_008_roughness.jpg",
+            ],
+            "Leather_008_normal.jpg",
+            Green::Up,
+            Assumed,
+            "Leather_008_roughness.jpg",
+        ),
+        (
+            "Megascans",
+            &["vbsj_4K_Albedo.jpg", "vbsj_4K_Normal_LOD0.jpg", "vbsj_4K_Roughness.jpg", "vbsj_Preview.png"],
+            "vbsj_4K_Normal_LOD0.jpg",
+            Green::Up,
+            Assumed,
+            "vbsj_4K_Roughness.jpg",
+        ),
+        (
+            "Unreal",
+            &["T_Brick_BC.TGA", "T_Brick_N.TGA", "T_Brick_ORM.TGA"],
+            "T_Brick_N.TGA",
+            Green::Up,
+            Assumed,
+            "T_Brick_ORM.TGA",
+        ),
+        (
+            "letters with company",
+            &["brick_D.png", "brick_N.png", "brick_R.png"],
+            "brick_N.png",
+            Green::Up,
+            Assumed,
+            "brick_R.png",
+        ),
+        (
+            "bare names",
+            &["normal.png", "roughness.png", "albedo.png"],
+            "normal.png",
+            Green::Up,
+            Assumed,
+            "roughness.png",
+        ),
+    ];
+    for (site, names, normal, green, source, roughness) in cases {
+        let material = only(names, &Hints::default());
+        let got = material.normal.as_ref().unwrap();
+        assert_eq!(
+            (file(&got.file).as_str(), got.green, got.green_source),
+            (*normal, *green, *source),
+            "{site}: {material:?}"
+        );
+        let Some(RoughnessSource::Isotropic(BaseRoughness::Roughness(map))) = &material.roughness else {
+            panic!("{site}: {:?}", material.roughness)
+        };
+        let channel = usize::from(Role::Orm == material.files.iter().find(|f| f.1 == map.file).unwrap().0);
+        assert_eq!((file(&map.file).as_str(), map.channel), (*roughness, channel), "{site}");
+        assert!(material.color.is_some(), "{site}: no color in {material:?}");
+    }
+}
+
+#[test]
+fn packed_channels_go_where_their_names_say() {
+    let cases = [
+        ("x_ORM.png", Some(0), Some((1, false)), Some(2)),
+        ("x_rma.png", Some(2), Some((0, false)), Some(1)),
+        ("x_mra.png", Some(2), Some((1, false)), Some(0)),
+        ("x_metallicRoughness.png", None, Some((1, false)), Some(2)),
+        ("x_MetallicSmoothness.png", None, Some((3, true)), Some(0)),
+        ("x_MaskMap.png", Some(1), Some((3, true)), Some(0)),
+    ];
+    for (name, occlusion, roughness, metallic) in cases {
+        let material = only(&["x_normal.png", name], &Hints::default());
+        let got = match &material.roughness {
+            Some(RoughnessSource::Isotropic(BaseRoughness::Roughness(m))) => Some((m.channel, false)),
+            Some(RoughnessSource::Isotropic(BaseRoughness::Gloss(m))) => Some((m.channel, true)),
+            other => panic!("{name}: {other:?}"),
+        };
+        let channel = |m: &Option<kinran_bake::folder::MapChannel>| m.as_ref().map(|m| m.channel);
+        assert_eq!(
+            (channel(&material.occlusion), got, channel(&material.metallic)),
+            (occlusion, roughness, metallic),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn a_map_of_its_own_goes_before_a_packed_channel_and_the_table_says_so() {
+    let folder =
+        scanned(&["r_arm_1k.png", "r_rough_1k.png", "r_ao_1k.png", "r_nor_gl_1k.png"], &Hints::default())
+            .unwrap();
+    let material = &folder.materials[0];
+    assert_eq!(file(&material.occlusion.as_ref().unwrap().file), "r_ao_1k.png");
+    assert_eq!(file(&material.metallic.as_ref().unwrap().file), "r_arm_1k.png");
+    let row = folder.rows.iter().find(|r| r.file == "r_arm_1k.png").unwrap();
+    assert_eq!(row.note, "its occlusion and roughness not used, another map has it");
+}
+
+#[test]
+fn several_materials_in_one_folder_keep_apart() {
+    let names = [
+        "Brick_normal.png",
+        "brick_rough.png",
+        "normal.png",
+        "stone-NormalDX.png",
+        "stone-Roughness.png",
+        "readme.txt",
+    ];
+    let dir = folder_of(&names);
+    let folder = scan(dir.path(), &Hints::default()).unwrap();
+    let own = file(dir.path());
+    let got: Vec<(&str, usize)> = folder.materials.iter().map(|m| (m.name.as_str(), m.files.len())).collect();
+    assert_eq!(got, [(own.as_str(), 1), ("Brick", 2), ("stone", 2)], "{}", folder.table());
+}
+
+#[test]
+fn a_lone_letter_is_no_map() {
+    let folder = scanned(&["plan_d.png", "rock_normal.png"], &Hints::default()).unwrap();
+    assert_eq!(folder.materials.len(), 1, "{}", folder.table());
+    let row = folder.rows.iter().find(|r| r.file == "plan_d.png").unwrap();
+    assert_eq!((row.role, row.note.starts_with("not used: a letter alone")), (None, true), "{row:?}");
+}
+
+#[test]
+fn hidden_files_and_folders_called_like_maps_are_passed_over() {
+    let dir = folder_of(&["a_normal.png", "._a_normal.png", ".a_rough.png"]);
+    fs::create_dir(dir.path().join("a_roughness.png")).unwrap();
+    let folder = scan(dir.path(), &Hints::default()).unwrap();
+    assert_eq!(folder.rows.len(), 2, "{}", folder.table());
+    let source = folder.materials[0].roughness.clone();
+    assert_eq!(source, Some(RoughnessSource::Isotropic(BaseRoughness::Constant(ASSUMED_ROUGHNESS))));
+    assert!(folder.rows[1].note.contains("--roughness"), "{}", folder.table());
+}
+
+// Questions
+
+#[test]
+fn what_can_be_read_in_two_ways_is_asked_by_a_flag_that_then_settles_it() {
+    struct Case {
+        names: &'static [&'static str],
+        says: &'static [&'static str],
+        settled: Hints,
+    }
+    let cases = [
+        Case {
+            names: &["w_normal.png", "w_nrm.png"],
+            says: &["several normal maps", "w_normal.png, w_nrm.png", "--map normal=w_nrm.png", "--ignore"],
+            settled: maps(&[(Role::Normal, "w_nrm.png")]),
+        },
+        Case {
+            names: &["w_normal.png", "w_NormalGL.png"],
+            says: &["several normal maps"],
+            settled: Hints { ignore: vec!["w_normal.png".into()], ..Hints::default() },
+        },
+        Case {
+            names: &["w_1k_NormalGL.png", "w_2k_NormalGL.png"],
+            says: &["several normal maps"],
+            settled: maps(&[(Role::Normal, "w_2k_NormalGL.png")]),
+        },
+        Case {
+            names: &["w_normal.png", "w_rough.png", "w_gloss.png"],
+            says: &[
+                "both roughness and gloss",
+                "w_gloss.png",
+                "--map gloss=w_gloss.png",
+                "--map roughness=w_rough.png",
+            ],
+            settled: maps(&[(Role::Gloss, "w_gloss.png")]),
+        },
+        Case {
+            names: &["w_albedo.png", "w_diffuse.png", "w_normal.png"],
+            says: &["several color maps", "--map color=w_diffuse.png"],
+            settled: maps(&[(Role::Color, "w_albedo.png")]),
+        },
+        Case {
+            names: &["w_normal.png", "w_spec.png"],
+            says: &["_spec can mean gloss", "--map gloss=w_spec.png", "--roughness VALUE"],
+            settled: maps(&[(Role::Gloss, "w_spec.png")]),
+        },
+        Case {
+            names: &["w_normal.png", "w_spec.png"],
+            says: &["_spec can mean gloss"],
+            settled: Hints { roughness: Some(0.3), ..Hints::default() },
+        },
+        Case {
+            names: &["w_glossU.png", "w_normal.png"],
+            says: &["gloss-u map but no gloss-v", "--map gloss-v=FILE", "--map gloss=FILE"],
+            settled: maps(&[(Role::Gloss, "w_glossU.png")]),
+        },
+        Case {
+            names: &["w_glossU.png", "w_glossV.png", "w_roughness.png"],
+            says: &["roughness is given twice"],
+            settled: Hints { ignore: vec!["w_roughness.png".into()], ..Hints::default() },
+        },
+        Case {
+            names: &["w_aniso.png", "w_anisotropy.png", "w_roughness.png"],
+            says: &["several maps say how the highlight is stretched", "--map aniso=w_aniso.png"],
+            settled: maps(&[(Role::Anisotropy, "w_anisotropy.png")]),
+        },
+        Case {
+            names: &["w_flow.png", "w_normal.png"],
+            says: &["nothing says how strong", "--anisotropy", "--ignore w_flow.png"],
+            settled: Hints { anisotropy: Some(0.5), ..Hints::default() },
+        },
+        Case {
+            names: &["w_orm.png", "w_metallicRoughness.png"],
+            says: &["several packed maps"],
+            settled: maps(&[(Role::Orm, "w_orm.png")]),
+        },
+        Case {
+            names: &["w_flow.png", "w_anisotropyangle.png", "w_anisotropylevel.png"],
+            says: &["two direction maps"],
+            settled: maps(&[(Role::Direction, "w_flow.png")]),
+        },
+    ];
+    for case in cases {
+        let error = refused(case.names, &Hints::default());
+        for says in case.says {
+            assert!(error.contains(says), "{:?}: wanted \"{says}\" in: {error}", case.names);
+        }
+        assert!(error.starts_with("material \"w\""), "{error}");
+        only(case.names, &case.settled);
+    }
+}
+
+#[test]
+fn gl_and_dx_together_give_gl_unless_asked() {
+    let names = ["m_NormalDX.png", "m_NormalGL.png", "m_Roughness.png"];
+    let up = scanned(&names, &Hints::default()).unwrap();
+    assert_eq!(file(&up.materials[0].normal.as_ref().unwrap().file), "m_NormalGL.png");
+    assert!(up.table().contains("not used: the same normals as m_NormalGL.png"), "{}", up.table());
+    let down = only(&names, &Hints { green: Some(Green::Down), ..Hints::default() });
+    let normal = down.normal.unwrap();
+    assert_eq!((file(&normal.file).as_str(), normal.green), ("m_NormalDX.png", Green::Down));
+}
+
+#[test]
+fn flags_that_cannot_be_are_named() {
+    let names = ["brick_normal.png", "stone_normal.png", "thing.png"];
+    let cases = [
+        (maps(&[(Role::Roughness, "gone.png")]), "--map roughness=gone.png: no such file"),
+        (maps(&[(Role::Roughness, "thing.png")]), "which of the materials brick, stone"),
+        (
+            maps(&[(Role::Roughness, "brick_normal.png"), (Role::Gloss, "brick_normal.png")]),
+            "another --map names this file",
+        ),
+        (Hints { ignore: vec!["gone.png".into()], ..Hints::default() }, "--ignore gone.png"),
+        (Hints { roughness: Some(f32::NAN), ..Hints::default() }, "--roughness NaN: give 0 to 1"),
+        (Hints { anisotropy: Some(2.0), ..Hints::default() }, "--anisotropy 2: give 0 to 1"),
+        (Hints { direction_span: Some(-1.0), ..Hints::default() }, "--direction-span"),
+        (Hints { direction_span: Some(f32::INFINITY), ..Hints::default() }, "--direction-span"),
+    ];
+    for (hints, wanted) in cases {
+        let error = refused(&names, &hints);
+        assert!(error.contains(wanted), "wanted \"{wanted}\" in: {error}");
+    }
+}
+
+#[test]
+fn a_named_file_joins_the_material_whose_name_it_begins_with() {
+    let names = ["brick_normal.png", "brick_wall_normal.png", "brick_wall_thing.png"];
+    let folder = scanned(&names, &maps(&[(Role::Gloss, "brick_wall_thing.png")])).unwrap();
+    let wall = folder.materials.iter().find(|m| m.name == "brick_wall").unwrap();
+    assert_eq!(wall.files.len(), 2, "{}", folder.table());
+}
+
+// What folders may hold
+
+#[test]
+fn folders_without_maps_say_what_was_looked_for_and_what_is_there() {
+    let error = refused(&["holiday.png", "readme.txt", "rock_height.png"], &Hints::default());
+    for wanted in ["no maps found", "_normal", "--map ROLE=FILE", "holiday.png, readme.txt, rock_height.png"]
+    {
+        assert!(error.contains(wanted), "wanted \"{wanted}\" in: {error}");
+    }
+    assert!(refused(&[], &Hints::default()).contains("saw no files"));
+}
+
+#[test]
+fn missing_folders_and_files_in_their_place_are_named() {
+    let dir = folder_of(&["a.png"]);
+    let gone = dir.path().join("gone");
+    let error = scan(&gone, &Hints::default()).unwrap_err().to_string();
+    assert!(error.contains("gone") && error.contains("check that"), "{error}");
+    let error = scan(&dir.path().join("a.png"), &Hints::default()).unwrap_err().to_string();
+    assert!(error.contains("a.png") && error.contains("not a folder"), "{error}");
+}
+
+#[test]
+fn damaged_and_vanished_files_are_named() {
+    let dir = folder_of(&["a_normal.png", "a_rough.png"]);
+    let folder = scan(dir.path(), &Hints::default()).unwrap();
+    let error = folder.materials[0].load().unwrap_err().to_string();
+    assert!(error.contains("a_normal.png") && error.contains("empty"), "{error}");
+    fs::remove_file(dir.path().join("a_normal.png")).unwrap();
+    let error = folder.materials[0].load().unwrap_err().to_string();
+    assert!(error.contains("a_normal.png") && error.contains("check that"), "{error}");
+}
+
+#[cfg(unix)]
+#[test]
+fn names_that_are_no_text_are_read_shown_and_serialized() {
+    use std::os::unix::ffi::OsStrExt;
+    let dir = folder_of(&[]);
+    for name in [&b"br\xffck_normal.png"[..], b"br\xffck_rough.png", b"br\xffck_\x1b[2J.png"] {
+        fs::write(dir.path().join(std::ffi::OsStr::from_bytes(name)), b"").unwrap();
+    }
+    let folder = scan(dir.path(), &Hints::default()).unwrap();
+    assert_eq!(folder.materials.len(), 1);
+    assert!(!folder.table().contains('\x1b'), "{:?}", folder.table());
+    let json = serde_json::to_string(&folder).unwrap();
+    assert!(json.contains("br\u{fffd}ck_normal.png"), "{json}");
+}
+
+#[test]
+fn the_table_is_aligned_and_the_json_has_no_paths() {
+    let dir = folder_of(&["Stoff_Ölig_normal.png", "Stoff_Ölig_ARM_2k.png", "photo.jpg"]);
+    let folder = scan(dir.path(), &Hints::default()).unwrap();
+    let wanted = "\
+material    file                   role    channels                              notes
+Stoff_Ölig  Stoff_Ölig_ARM_2k.png  orm     R occlusion, G roughness, B metallic
+Stoff_Ölig  Stoff_Ölig_normal.png  normal  RG normal                             assumed +Y
+            photo.jpg              -       -                                     not recognised, not used
+";
+    assert_eq!(folder.table(), wanted);
+    let json = serde_json::to_string(&folder).unwrap();
+    assert!(!json.contains(dir.path().to_str().unwrap()), "{json}");
+    assert!(json.contains(r#""role":"orm""#), "{json}");
+}
+
+// Texels
+
+#[test]
+fn the_curl_tells_green_up_from_green_down() {
+    for (green, guess) in [(Green::Up, GreenGuess::Up), (Green::Down, GreenGuess::Down)] {
+        let image = waves(green);
+        let got = green_correlation(&image);
+        assert_eq!(guess_green(&image), guess, "correlation {got}");
+        assert!(got.abs() > 0.9, "a gradient's correlation should be near 1, got {got}");
+    }
+}
+
+#[test]
+fn flat_and_tiny_maps_do_not_tell_green() {
+    for side in [1, 2, 3, 16] {
+        let image = image(side, Channels::Rgb, |_, _| [0.5, 0.5, 1.0, 1.0]);
+        assert_eq!(
+            (green_correlation(&image), guess_green(&image)),
+            (0.0, GreenGuess::Unsure),
+            "side {side}"
+        );
+    }
+}
+
+#[test]
+fn an_unlabelled_map_that_looks_like_directx_is_asked_about_a_labelled_one_only_noted() {
+    let (up, down) = (waves(Green::Up), waves(Green::Down));
+    let plain = Hints::default();
+    let error = load_one(&[("x_normal.png", &down)], &plain).unwrap_err().to_string();
+    for wanted in ["x_normal.png", "--y-down", "--y-up"] {
+        assert!(error.contains(wanted), "{error}");
+    }
+    for green in [Green::Up, Green::Down] {
+        let flag = Hints { green: Some(green), ..Hints::default() };
+        let loaded = load_one(&[("x_normal.png", &down)], &flag).unwrap();
+        assert_eq!(loaded.surface.unwrap().normal.y_down, green == Green::Down);
+        assert_eq!(loaded.notes.len(), usize::from(green == Green::Up), "{:?}", loaded.notes);
+    }
+    let loaded = load_one(&[("x_NormalGL.png", &down)], &plain).unwrap();
+    assert!(!loaded.surface.unwrap().normal.y_down);
+    assert!(loaded.notes[0].contains("though its slopes look like -Y"), "{:?}", loaded.notes);
+    let loaded = load_one(&[("x_normal.png", &up)], &plain).unwrap();
+    assert!(loaded.notes[0].contains("assumed +Y, and its slopes agree"), "{:?}", loaded.notes);
+}
+
+#[test]
+fn colors_in_the_place_of_normals_are_refused_unless_forced() {
+    let brown = image(16, Channels::Rgb, |u, v| [0.5 + 0.2 * u, 0.35, 0.2 + 0.1 * v, 1.0]);
+    let pale = image(16, Channels::Rgb, |_, v| [0.82, 0.78 + 0.02 * v, 0.71, 1.0]);
+    for (what, wrong) in [("brown", &brown), ("pale", &pale), ("grey", &grey(0.8))] {
+        let error = load_one(&[("x_normal.png", wrong)], &Hints::default()).unwrap_err().to_string();
+        for wanted in
+            ["x_normal.png", "not a tangent-space normal map", "--force-normal", "--map normal=FILE"]
+        {
+            assert!(error.contains(wanted), "{what}: {error}");
+        }
+        let forced = Hints { force_normal: true, ..Hints::default() };
+        load_one(&[("x_normal.png", wrong)], &forced).unwrap_or_else(|e| panic!("{what}: {e}"));
+    }
+}
+
+#[test]
+fn float_maps_with_negative_components_are_normals_too() {
+    let eight = waves(Green::Up);
+    let Pixels::U16(samples) = &eight.pixels else { unreachable!() };
+    let signed = samples.iter().map(|&s| f32::from(s) / 65535.0 * 2.0 - 1.0).collect();
+    let image = Image::new(64, 64, Channels::Rgb, Pixels::F32(signed)).unwrap();
+    assert!((green_correlation(&image) - green_correlation(&eight)).abs() < 1e-4);
+    let dir = tempfile::tempdir().unwrap();
+    kinran_image::write_exr(&dir.path().join("x_nor_gl.exr"), &image).unwrap();
+    let loaded = scan(dir.path(), &Hints::default()).unwrap().materials[0].load().unwrap();
+    assert!(loaded.surface.unwrap().normal.signed);
+    assert_eq!(loaded.notes, [""; 0]);
+}
+
+#[test]
+fn gloss_is_one_minus_roughness() {
+    for (name, hints) in [
+        ("x_gloss.png", Hints::default()),
+        ("x_rough.png", Hints { roughness_is_gloss: true, ..Hints::default() }),
+    ] {
+        let loaded = load_one(&[(name, &grey(0.4))], &hints).unwrap();
+        assert_near(first_texel(&loaded), 0.36, 0.36, Vec2::X, name);
+    }
+    let loaded = load_one(&[("x_rough.png", &grey(0.4))], &Hints::default()).unwrap();
+    assert_near(first_texel(&loaded), 0.16, 0.16, Vec2::X, "roughness");
+}
+
+#[test]
+fn alpha_channels_of_unity_maps_are_gloss_and_missing_ones_are_refused() {
+    let rgba = image(8, Channels::Rgba, |_, _| [0.0, 0.5, 0.0, 0.7]);
+    let loaded =
+        load_one(&[("x_MaskMap.png", &rgba), ("x_normal.png", &waves(Green::Up))], &Hints::default());
+    assert_near(first_texel_flat(&loaded.unwrap()), 0.09, 0.09, Vec2::X, "mask map");
+    let grey_alpha = image(8, Channels::Rg, |_, _| [1.0, 0.7, 0.0, 0.0]);
+    let loaded = load_one(&[("x_MetallicSmoothness.png", &grey_alpha)], &Hints::default()).unwrap();
+    assert_near(first_texel(&loaded), 0.09, 0.09, Vec2::X, "grey and alpha");
+    let rgb = image(8, Channels::Rgb, |_, _| [1.0, 0.7, 0.0, 0.0]);
+    let error = load_one(&[("x_MetallicSmoothness.png", &rgb)], &Hints::default()).unwrap_err().to_string();
+    assert!(error.contains("no alpha channel") && error.contains("x_MetallicSmoothness.png"), "{error}");
+}
+
+/// As [`first_texel`], with the surface's normals taken away.
+fn first_texel_flat(material: &LoadedMaterial) -> [f32; 3] {
+    let mut flat = material.clone();
+    flat.surface.as_mut().unwrap().normal = kinran_bake::aniso::NormalMap::flat();
+    first_texel(&flat)
+}
+
+#[test]
+fn substance_levels_and_angles_become_alphas_along_the_angle() {
+    // roughness 0.4: alpha 0.16; level 0.8: 0.16 + 0.4096. An eighth of a turn is 45 degrees.
+    let files = [
+        ("x_Roughness.png", &grey(0.4)),
+        ("x_Anisotropy_level.png", &image(4, Channels::R, |_, _| [0.8; 4])),
+        ("x_Anisotropy_angle.png", &grey(0.125)),
+    ];
+    let loaded = load_one(&files, &Hints::default()).unwrap();
+    let axis = vec2(0.5f32.sqrt(), 0.5f32.sqrt());
+    assert_near(first_texel(&loaded), 0.16 + 0.4096, 0.16, axis, "full turn");
+    let half = Hints { direction_span: Some(PI), ..Hints::default() };
+    let loaded = load_one(&files, &half).unwrap();
+    let axis = vec2((PI / 8.0).cos(), (PI / 8.0).sin());
+    assert_near(first_texel(&loaded), 0.16 + 0.4096, 0.16, axis, "half turn by flag");
+}
+
+#[test]
+fn gloss_along_and_across_with_a_direction_vector() {
+    let up = image(8, Channels::Rgb, |_, _| [0.5, 1.0, 0.0, 1.0]);
+    let files = [("x_GlossU.png", &grey(0.2)), ("x_GlossV.png", &grey(0.7)), ("x_flow.png", &up)];
+    let loaded = load_one(&files, &Hints::default()).unwrap();
+    assert_near(first_texel(&loaded), 0.64, 0.09, Vec2::Y, "u along +y");
+}
+
+#[test]
+fn grey_directions_ask_for_their_span() {
+    let files =
+        [("x_GlossU.png", &grey(0.2)), ("x_GlossV.png", &grey(0.7)), ("x_direction.png", &grey(0.25))];
+    let error = load_one(&files, &Hints::default()).unwrap_err().to_string();
+    for wanted in ["x_direction.png", "--direction-span 360", "--direction-span 180"] {
+        assert!(error.contains(wanted), "{error}");
+    }
+    let span = |span| Hints { direction_span: Some(span), ..Hints::default() };
+    let loaded = load_one(&files, &span(TAU)).unwrap();
+    assert_near(first_texel(&loaded), 0.64, 0.09, Vec2::Y, "a quarter of 360 degrees");
+    let loaded = load_one(&files, &span(PI)).unwrap();
+    assert_near(
+        first_texel(&loaded),
+        0.64,
+        0.09,
+        vec2(0.5f32.sqrt(), 0.5f32.sqrt()),
+        "a quarter of 180 degrees",
+    );
+}
+
+#[test]
+fn gltf_anisotropy_works_with_roughness_and_with_gloss() {
+    // Strength 0.5 along +y: alpha_t = 0.16 + 0.84 / 4.
+    let khr = image(8, Channels::Rgb, |_, _| [0.5, 1.0, 0.5, 1.0]);
+    for (name, base) in [("x_roughness.png", grey(0.4)), ("x_gloss.png", grey(0.6))] {
+        let loaded = load_one(&[("x_anisotropy.png", &khr), (name, &base)], &Hints::default()).unwrap();
+        assert_near(first_texel(&loaded), 0.16 + 0.84 * 0.25, 0.16, Vec2::Y, name);
+    }
+    let error =
+        load_one(&[("x_anisotropy.png", &grey(0.5)), ("x_roughness.png", &grey(0.4))], &Hints::default());
+    assert!(error.unwrap_err().to_string().contains("--map anisotropy-level=x_anisotropy.png"));
+}
+
+#[test]
+fn a_strength_by_flag_stretches_a_constant_roughness() {
+    let flow = image(8, Channels::Rgb, |_, _| [1.0, 0.5, 0.0, 1.0]);
+    let hints = Hints { anisotropy: Some(0.5), roughness: Some(0.4), ..Hints::default() };
+    let loaded = load_one(&[("x_flow.png", &flow)], &hints).unwrap();
+    assert_near(first_texel(&loaded), 0.16 + 0.84 * 0.25, 0.16, Vec2::X, "constants");
+}
+
+#[test]
+fn aniso_maps_pass_as_they_are() {
+    let encoded = image(8, Channels::Rgb, |_, _| [0.8, 0.75, 0.2, 1.0]);
+    let loaded = load_one(&[("x_aniso.png", &encoded)], &Hints::default()).unwrap();
+    let got = first_texel(&loaded);
+    let wanted = [0.64, 0.8 * 0.5 * 0.2, 0.04];
+    assert!(got.iter().zip(wanted).all(|(g, w)| (g - w).abs() < 1e-4), "wanted {wanted:?} got {got:?}");
+    let error = load_one(&[("x_aniso.png", &grey(0.5))], &Hints::default()).unwrap_err().to_string();
+    assert!(error.contains("three different channels"), "{error}");
+}
+
+#[test]
+fn color_alone_is_a_material_without_a_surface() {
+    let color = image(4, Channels::Rgb, |u, v| [u, v, 0.3, 1.0]);
+    let loaded = load_one(&[("x_albedo.png", &color)], &Hints::default()).unwrap();
+    assert!(loaded.surface.is_none());
+    assert_eq!((loaded.images.len(), loaded.images[0].role), (1, Role::Color));
+}
+
+#[test]
+fn maps_of_different_sizes_are_taken() {
+    let loaded = load_one(
+        &[
+            ("x_NormalGL.png", &waves(Green::Up)),
+            ("x_arm.png", &{ image(16, Channels::Rgb, |_, _| [1.0, 0.4, 0.9, 1.0]) }),
+        ],
+        &Hints::default(),
+    )
+    .unwrap();
+    let surface = loaded.surface.as_ref().unwrap();
+    assert_eq!(surface.size(), (64, 64));
+    let arm = loaded.images.iter().position(|l| l.role == Role::Orm).unwrap();
+    assert_eq!((loaded.occlusion, loaded.metallic), (Some((arm, 0)), Some((arm, 2))));
+    assert_near(first_texel_flat(&loaded), 0.16, 0.16, Vec2::X, "green of the packed map");
+}
+
+// Real files
+
+fn assets() -> Option<PathBuf> {
+    let path = std::env::var_os("KINRAN_ASSETS").map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/assets")),
+        PathBuf::from,
+    );
+    if path.join("materials").is_dir() {
+        return Some(path);
+    }
+    println!("skipped: no assets at {}", path.display());
+    None
+}
+
+fn material_folders(assets: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(assets.join("materials")).unwrap();
+    let mut folders: Vec<PathBuf> = entries.map(|e| e.unwrap().path()).filter(|p| p.is_dir()).collect();
+    folders.sort();
+    folders
+}
+
+#[test]
+fn every_real_material_is_understood() {
+    let Some(assets) = assets() else { return };
+    let mut surfaces = 0;
+    for folder in material_folders(&assets) {
+        let has = |name: &str| folder.join(name).exists();
+        if !has("albedo.png") && !has("normal.png") {
+            continue;
+        }
+        // A direction without a strength is asked for.
+        let strength = has("flow.png").then_some(0.6);
+        if strength.is_some() {
+            let error = scan(&folder, &Hints::default()).unwrap_err().to_string();
+            assert!(error.contains("flow.png") && error.contains("--anisotropy"), "{error}");
+        }
+        let hints = Hints { anisotropy: strength, ..Hints::default() };
+        let understood = scan(&folder, &hints).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+        assert_eq!(understood.materials.len(), 1, "{}", understood.table());
+        let unknown: Vec<_> = understood.rows.iter().filter(|r| r.role.is_none()).collect();
+        assert!(unknown.is_empty(), "{}: {unknown:?}", folder.display());
+
+        let material = understood.materials[0].load().unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+        let surface = material.surface.as_ref();
+        assert_eq!(surface.is_some(), has("normal.png") || has("roughness.png"), "{}", folder.display());
+        assert_eq!(surface.is_some_and(|s| s.normal.image.is_some()), has("normal.png"));
+        if let Some(surface) = surface {
+            surfaces += 1;
+            match &surface.roughness {
+                RoughnessMaps::Gloss { direction: Some(DirectionMap::Vector(_)), .. } => {
+                    assert!(has("flow.png"))
+                }
+                RoughnessMaps::Isotropic(map) => assert_eq!(map.image.is_some(), has("roughness.png")),
+                other => panic!("{}: {other:?}", folder.display()),
+            }
+            let [xx, _, yy] = first_texel(&material);
+            let least = ALPHA_MIN * ALPHA_MIN * 0.99;
+            assert!(
+                xx >= least && yy >= least && xx <= 1.001 && yy <= 1.001,
+                "{}: {xx} {yy}",
+                folder.display()
+            );
+        }
+    }
+    assert!(surfaces > 40, "only {surfaces} of the folders had a surface");
+}
+
+/// Whether the height map beside a normal map says green up: the sign of its correlation with ∂h/∂v, if that
+/// with ∂h/∂x is positive, as bright means high.
+fn green_by_height(normal: &Image, height: &Image) -> Green {
+    assert_eq!((normal.width, normal.height), (height.width, height.height));
+    let (mut along_x, mut along_v) = (0.0, 0.0);
+    for y in 1..normal.height - 1 {
+        for x in 1..normal.width - 1 {
+            let n = normal.texel(x, y).map(|v| f64::from(v) * 2.0 - 1.0);
+            let h = |x, y| f64::from(height.texel(x, y)[0]);
+            along_x -= n[0] * (h(x + 1, y) - h(x - 1, y));
+            along_v += n[1] * (h(x, y + 1) - h(x, y - 1));
+        }
+    }
+    assert!(along_x > 0.0, "bright is low here: {along_x}");
+    if along_v > 0.0 { Green::Up } else { Green::Down }
+}
+
+#[test]
+fn the_curl_never_contradicts_height_maps_labels_and_formats() {
+    let Some(assets) = assets() else { return };
+    let mut files: Vec<(PathBuf, Green)> = Vec::new();
+    for folder in material_folders(&assets) {
+        let (normal, height) = (folder.join("normal.png"), folder.join("height.png"));
+        if normal.exists() && height.exists() {
+            let green = green_by_height(&read_image(&normal).unwrap(), &read_image(&height).unwrap());
+            files.push((normal, green));
+        }
+    }
+    let with_height = files.len();
+
+    // Green up by their names or, as textures of glTF files, by the format.
+    let meshes = [
+        "sheen_chair/SheenChairFabricNormal.jpg",
+        "horse_statue_01/textures/horse_statue_01_nor_gl_1k.jpg",
+        "sofa_03/textures/sofa_03_nor_gl_1k.jpg",
+        "curtain/textures/curtain_normal.png",
+        "lee_perry_smith/normal.jpg",
+        "anisotropy_barn_lamp/AnisotropyBarnLamp_normalbump.png",
+    ];
+    let meshes = meshes.iter().map(|f| assets.join("meshes").join(f)).filter(|f| f.exists());
+    files.extend(meshes.map(|f| (f, Green::Up)));
+
+    let mut sure = 0;
+    for (file, green) in &files {
+        let image = read_image(file).unwrap();
+        let (correlation, guess) = (green_correlation(&image), guess_green(&image));
+        println!("{correlation:+.3} {green:?} {}", file.strip_prefix(&assets).unwrap().display());
+        assert!(!guess.contradicts(*green), "{}: wanted {green:?} got {correlation}", file.display());
+        sure += usize::from(correlation.abs() >= GREEN_CONFIDENCE);
+    }
+    println!("{with_height} with height maps, sure of {sure} of {}", files.len());
+    assert!(with_height >= 16, "{with_height} height maps");
+    assert!(sure * 4 >= files.len() * 3, "sure of {sure} of {}", files.len());
+}
+
+#[test]
+fn no_real_map_of_another_kind_passes_for_normals() {
+    let Some(assets) = assets() else { return };
+    let mut count = 0;
+    for folder in material_folders(&assets) {
+        let mut files: Vec<PathBuf> = fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path()).collect();
+        files.sort();
+        for wrong in
+            files.iter().filter(|f| f.extension().is_some_and(|e| e == "png") && !f.ends_with("normal.png"))
+        {
+            let material = MaterialMaps {
+                name: "wrong".into(),
+                normal: Some(kinran_bake::folder::NormalSource {
+                    file: wrong.clone(),
+                    green: Green::Up,
+                    green_source: GreenSource::Name,
+                    force: false,
+                }),
+                roughness: Some(RoughnessSource::Isotropic(BaseRoughness::Constant(0.5))),
+                color: None,
+                occlusion: None,
+                metallic: None,
+                files: vec![(Role::Normal, wrong.clone())],
+                wrap: Hints::default().wrap,
+            };
+            let error = material.load().map(|_| ()).expect_err(&wrong.display().to_string()).to_string();
+            assert!(error.contains("--force-normal"), "{error}");
+            count += 1;
+        }
+    }
+    println!("{count} images refused as normal maps");
+    assert!(count > 100, "only {count} images were tried");
+}
+
+// Anything
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn arbitrary_names_neither_panic_nor_get_lost(
+        names in proptest::collection::btree_set(
+            prop_oneof!["[^/\\x00]{1,24}", "(T_)?[a-cN_. -]{0,4}(normal|Gloss|U|Flow|ARM|rough|2K|_|GL|dx|spec|n|r){1,4}"],
+            1..8,
+        ),
+    ) {
+        let dir = tempfile::tempdir().unwrap();
+        let mut visible = 0;
+        for name in &names {
+            let file = format!("{name}.png");
+            if fs::write(dir.path().join(&file), b"").is_ok() && !file.starts_with('.') {
+                visible += 1;
+            }
+        }
+        match scan(dir.path(), &Hints::default()) {
+            Ok(folder) => {
+                let files = folder.rows.iter().filter(|r| r.file != "-").count();
+                prop_assert_eq!(files, visible, "{}", folder.table());
+                prop_assert_eq!(folder.table().lines().count(), folder.rows.len() + 1);
+            }
+            Err(e) => prop_assert!(!e.to_string().is_empty()),
+        }
+    }
+}

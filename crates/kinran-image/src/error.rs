@@ -1,0 +1,52 @@
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// Why an image or a texture could not be read, written, encoded or decoded.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The operating system refused to read or write the file.
+    #[error("{}: {source}{}", path.display(), fix(source.kind()))]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The file's content is not what its format demands.
+    #[error("{}: {reason}", path.display())]
+    Malformed {
+        /// The file, or the name its bytes came under.
+        path: PathBuf,
+        /// What is wrong, and what would be right.
+        reason: String,
+    },
+    /// The request cannot be served: a format, size or option outside what the function can do.
+    #[error("{0}")]
+    Unsupported(String),
+}
+
+impl Error {
+    /// An [`Error::Malformed`] about `path`.
+    pub fn malformed(path: impl AsRef<Path>, reason: impl Into<String>) -> Self {
+        Error::Malformed { path: path.as_ref().to_path_buf(), reason: reason.into() }
+    }
+
+    /// An [`Error::Io`] about `path`.
+    pub fn io(path: impl AsRef<Path>, source: std::io::Error) -> Self {
+        Error::Io { path: path.as_ref().to_path_buf(), source }
+    }
+}
+
+/// What a person can do about an I/O error of this kind, to be appended to its message.
+fn fix(kind: ErrorKind) -> &'static str {
+    match kind {
+        ErrorKind::NotFound => "; check that the file or its folder exists and is spelled so",
+        ErrorKind::PermissionDenied => {
+            "; change the permissions of the file and its folder, or choose another"
+        }
+        ErrorKind::ReadOnlyFilesystem => "; choose a folder on a writable disk",
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "; free some space or choose another disk",
+        ErrorKind::IsADirectory => "; name a file in it",
+        _ => "",
+    }
+}

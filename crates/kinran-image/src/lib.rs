@@ -1,0 +1,25 @@
+//! Typed images, block compression, KTX2 and DDS.
+//!
+//! [`Image`] is what a person authored (PNG, JPEG, TGA, TIFF, HDR, EXR), [`Texture`] is what an engine
+//! loads (a mip chain in one [`Format`], in a KTX2 or DDS container). Every reader takes bytes that may
+//! be damaged or hostile and answers with an [`Error`] that names the file and the reason.
+
+mod block;
+mod dds_file;
+mod error;
+mod image;
+mod ktx2_file;
+mod read;
+mod texture;
+mod texture_file;
+mod write;
+
+pub use block::{Encoder, Encoding, Preset, Role, decode, encode, encode_half, encode_parallel};
+pub use dds_file::{decode_dds, encode_dds};
+pub use error::Error;
+pub use image::{Channels, Image, MAX_IMAGE_BYTES, MAX_SIDE, Pixels};
+pub use ktx2_file::{decode_ktx2, encode_ktx2};
+pub use read::{decode_image, read_image};
+pub use texture::{Format, Level, Texture, Transfer, full_level_count, level_size};
+pub use texture_file::{decode_texture, read_texture, write_texture};
+pub use write::{encode_png, write_atomically, write_atomically_with, write_exr, write_png};

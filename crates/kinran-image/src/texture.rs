@@ -1,0 +1,144 @@
+use std::collections::BTreeMap;
+
+use crate::image::check_sides;
+use crate::{Error, decode};
+
+/// The layout of a texture's bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Format {
+    /// 4 bits a texel, RGB.
+    Bc1,
+    /// 4 bits a texel, R.
+    Bc4,
+    /// 8 bits a texel, RG.
+    Bc5,
+    /// 8 bits a texel, RGBA.
+    Bc7,
+    /// One byte a channel.
+    Rgba8,
+    /// One half float a channel.
+    Rgba16F,
+}
+
+impl Format {
+    /// Texels along a side of the unit the bytes come in: 4 for block formats, 1 for the others.
+    pub fn block_side(self) -> u32 {
+        match self {
+            Format::Bc1 | Format::Bc4 | Format::Bc5 | Format::Bc7 => 4,
+            Format::Rgba8 | Format::Rgba16F => 1,
+        }
+    }
+
+    /// Bytes of one block, or of one texel in formats without blocks.
+    pub fn block_bytes(self) -> usize {
+        match self {
+            Format::Rgba8 => 4,
+            Format::Bc1 | Format::Bc4 | Format::Rgba16F => 8,
+            Format::Bc5 | Format::Bc7 => 16,
+        }
+    }
+
+    /// Bytes of a level of `width` x `height` texels, blocks at the edges counted whole.
+    pub fn level_bytes(self, width: u32, height: u32) -> usize {
+        let side = self.block_side();
+        width.div_ceil(side) as usize * height.div_ceil(side) as usize * self.block_bytes()
+    }
+
+    /// Whether the GPU can linearise this format's colour while sampling.
+    pub fn has_srgb(self) -> bool {
+        matches!(self, Format::Bc1 | Format::Bc7 | Format::Rgba8)
+    }
+}
+
+/// What a colour channel's numbers mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Transfer {
+    /// Numbers are used as they are: normals, roughness, aniso, masks, HDR colour.
+    Linear,
+    /// sRGB-encoded colour, linearised by the sampler.
+    Srgb,
+}
+
+/// One mip level in a [`Texture`]'s format.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Level {
+    /// Texels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Tightly packed rows (of blocks, for block formats).
+    pub data: Vec<u8>,
+}
+
+/// A runtime texture: a 2D mip chain and what is known about it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Texture {
+    /// The bytes' layout.
+    pub format: Format,
+    /// The meaning of the colour channels.
+    pub transfer: Transfer,
+    /// Level 0 first; each level is half the one before, rounded down, at least 1.
+    pub levels: Vec<Level>,
+    /// Key/value pairs stored in the container (KTX2 key/value data), values as text. DDS has no place for
+    /// them.
+    pub metadata: BTreeMap<String, String>,
+}
+
+/// The size of level `level` below a level 0 of `size` texels along one axis: half at each step, rounded
+/// down, at least 1 (Vulkan 1.3, section 12.3).
+pub fn level_size(size: u32, level: usize) -> u32 {
+    size.checked_shr(level as u32).unwrap_or(0).max(1)
+}
+
+/// The number of levels down to 1x1.
+pub fn full_level_count(width: u32, height: u32) -> usize {
+    width.max(height).max(1).ilog2() as usize + 1
+}
+
+impl Texture {
+    /// Refuses a texture that no container or GPU can hold as it is.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where there is no level or more than [`full_level_count`], a side is 0 or
+    /// above [`MAX_SIDE`](crate::MAX_SIDE), a level is not half the one before, its data are not
+    /// [`Format::level_bytes`] long, or the format has no sRGB form and [`Transfer::Srgb`] is asked for.
+    pub fn check(&self) -> Result<(), Error> {
+        let fail = |reason: String| Err(Error::Unsupported(reason));
+        let Some(first) = self.levels.first() else { return fail("the texture has no levels".into()) };
+        check_sides(first.width, first.height).map_err(Error::Unsupported)?;
+        let most = full_level_count(first.width, first.height);
+        if self.levels.len() > most {
+            let (w, h, n) = (first.width, first.height, self.levels.len());
+            return fail(format!("a {w}x{h} texture has at most {most} levels, not {n}"));
+        }
+        if self.transfer == Transfer::Srgb && !self.format.has_srgb() {
+            return fail(format!("{:?} has no sRGB form; use linear, or BC1, BC7 or RGBA8", self.format));
+        }
+        for (i, level) in self.levels.iter().enumerate() {
+            let wanted = (level_size(first.width, i), level_size(first.height, i));
+            if (level.width, level.height) != wanted {
+                let (w, h) = wanted;
+                return fail(format!("level {i} must be {w}x{h}, got {}x{}", level.width, level.height));
+            }
+            let bytes = self.format.level_bytes(level.width, level.height);
+            if level.data.len() != bytes {
+                let (w, h, format, got) = (level.width, level.height, self.format, level.data.len());
+                return fail(format!("level {i}, {w}x{h} in {format:?}, takes {bytes} bytes, got {got}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The texels of a level as a sampler without filtering reads them, but for the sRGB decoding, which
+    /// is left to the caller. See [`decode`].
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where there is no such level or its data have another length than its size
+    /// demands.
+    pub fn decode_level(&self, level: usize) -> Result<Vec<[f32; 4]>, Error> {
+        let Some(l) = self.levels.get(level) else {
+            return Err(Error::Unsupported(format!("there is no level {level}, only {}", self.levels.len())));
+        };
+        decode(self.format, &l.data, l.width, l.height)
+    }
+}

@@ -1,0 +1,24 @@
+//! A deterministic ray caster on the CPU.
+//!
+//! [`RenderScene`] holds a scene in world space with its textures, [`render`] draws it. Primary rays carry
+//! differentials, so that a texture can be read as a GPU reads it; light comes from punctual sources and from
+//! an environment (diffuse by order-2 spherical harmonics, specular by multiple importance sampling). There is
+//! no light between surfaces.
+
+mod albedo;
+mod bvh;
+mod camera;
+mod geometry;
+mod light;
+mod render;
+mod sampler;
+mod scene;
+mod shading;
+mod texture;
+
+pub use bvh::{Bvh, Hit};
+pub use camera::{CameraRay, PictureCamera, frame_box, look_at};
+pub use geometry::{Geometry, MAX_TRIANGLES, SurfacePoint};
+pub use render::{Background, Film, Settings, TextureFiltering, render};
+pub use scene::{BoundTexture, RenderMaterial, RenderScene, SurfaceTextures, Surroundings};
+pub use texture::{MipLevel, MipTexture};

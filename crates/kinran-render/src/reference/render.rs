@@ -1,0 +1,364 @@
+//! The picture.
+
+use super::{
+    Hit, PictureCamera, RenderScene,
+    camera::CameraRay,
+    geometry::SurfacePoint,
+    light::incident,
+    sampler::{pixel_seed, sample_2d},
+    scene::{RenderMaterial, Surroundings},
+    shading::{Shading, shadow_transmittance},
+};
+use crate::Error;
+use glam::{Vec2, Vec3};
+use kinran_scene::{AlphaMode, Camera};
+use kinran_shading::{ggx_vndf_pdf, ggx_vndf_sample};
+use rayon::prelude::*;
+use std::f32::consts::{FRAC_1_PI, TAU};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// How textures are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum TextureFiltering {
+    /// As a GPU does, once per sample with the footprint of a whole pixel: trilinear, along up to
+    /// `max_anisotropy` (1 to 16) places of the longer axis.
+    Mips {
+        /// 1 is plain trilinear filtering.
+        max_anisotropy: u32,
+    },
+    /// Bilinear from level 0, the pixel's many samples being the filter: ground truth.
+    Level0,
+}
+
+/// What the camera sees where there is no surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Background {
+    /// The environment, seen through a cone of this half angle in radians; 0 is sharp.
+    Environment {
+        /// Radians, 0 to pi.
+        blur: f32,
+    },
+    /// Linear radiance.
+    Color(Vec3),
+}
+
+/// How to render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Pixels in a row, 1 to 32768.
+    pub width: u32,
+    /// Rows, 1 to 32768.
+    pub height: u32,
+    /// Samples in a pixel, box-filtered; powers of two are stratified best.
+    pub samples_per_pixel: u32,
+    /// How textures are read.
+    pub filtering: TextureFiltering,
+    /// For every sample of a pixel, this many of the specular lobe and as many of the environment; 0 leaves
+    /// the environment's specular reflection black.
+    pub env_samples: u32,
+    /// Punctual lights cast hard shadows.
+    pub shadows: bool,
+    /// Behind everything.
+    pub background: Background,
+}
+
+impl Default for Settings {
+    /// 512 by 512 pixels of 16 samples as a GPU with 16x anisotropic filtering draws them, with shadows.
+    fn default() -> Self {
+        Settings {
+            width: 512,
+            height: 512,
+            samples_per_pixel: 16,
+            filtering: TextureFiltering::Mips { max_anisotropy: 16 },
+            env_samples: 1,
+            shadows: true,
+            background: Background::Environment { blur: 0.0 },
+        }
+    }
+}
+
+/// A picture of linear radiance, Rec. 709.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height` pixels, row by row from the top.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+/// Longest side of a picture in pixels.
+const MAX_SIDE: u32 = 32768;
+
+/// Side of the squares of pixels that threads work on.
+const TILE: u32 = 16;
+
+/// Surfaces one behind the other that a ray may see or pass; beyond it there is nothing. Blended foliage
+/// rarely stacks more than a dozen.
+const MAX_LAYERS: usize = 128;
+
+/// Pairs of the sample sequence.
+const PIXEL: u32 = 0;
+const LOBE: u32 = 1;
+const ENVIRONMENT: u32 = 2;
+const BACKDROP: u32 = 3;
+
+/// Renders `scene`. `progress` is called with the number of tiles done and of all, from any thread. The same
+/// arguments give the same picture, bit by bit, whatever the number of threads.
+///
+/// # Errors
+/// [`Error::Setting`] for a size, a number of samples or an angle outside its range.
+pub fn render(
+    scene: &RenderScene,
+    camera: &Camera,
+    settings: &Settings,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Film, Error> {
+    check(camera, settings)?;
+    let (width, height) = (settings.width, settings.height);
+    let picture = PictureCamera::new(camera, width, height);
+    let renderer = Renderer { scene, settings, cutouts: scene.materials.iter().any(lets_light_through) };
+
+    let columns = width.div_ceil(TILE);
+    let total = (columns * height.div_ceil(TILE)) as usize;
+    let done = AtomicUsize::new(0);
+    let tiles: Vec<Vec<Vec3>> = (0..total as u32)
+        .into_par_iter()
+        .map(|tile| {
+            let (x0, y0) = (tile % columns * TILE, tile / columns * TILE);
+            let rows = y0..(y0 + TILE).min(height);
+            let pixels = rows.flat_map(|y| (x0..(x0 + TILE).min(width)).map(move |x| (x, y)));
+            let pixels = pixels.map(|(x, y)| renderer.pixel(&picture, x, y)).collect();
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+            pixels
+        })
+        .collect();
+
+    let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
+    for (tile, values) in tiles.iter().enumerate() {
+        let (x0, y0) = (tile as u32 % columns * TILE, tile as u32 / columns * TILE);
+        let row_length = TILE.min(width - x0) as usize;
+        for (row, values) in values.chunks_exact(row_length).enumerate() {
+            let start = (y0 as usize + row) * width as usize + x0 as usize;
+            for (pixel, value) in pixels[start..].iter_mut().zip(values) {
+                *pixel = value.to_array();
+            }
+        }
+    }
+    Ok(Film { width, height, pixels })
+}
+
+fn check(camera: &Camera, settings: &Settings) -> Result<(), Error> {
+    let refuse = |name, value: String, fix| Err(Error::Setting { name, value, fix });
+    for (name, side) in [("width", settings.width), ("height", settings.height)] {
+        if !(1..=MAX_SIDE).contains(&side) {
+            return refuse(name, side.to_string(), "it must be 1 to 32768 pixels");
+        }
+    }
+    if !(1..=1 << 20).contains(&settings.samples_per_pixel) {
+        let value = settings.samples_per_pixel.to_string();
+        return refuse("samples_per_pixel", value, "it must be 1 to 1048576");
+    }
+    if settings.env_samples > 1024 {
+        return refuse("env_samples", settings.env_samples.to_string(), "it must be 0 to 1024");
+    }
+    if let TextureFiltering::Mips { max_anisotropy } = settings.filtering
+        && !(1..=16).contains(&max_anisotropy)
+    {
+        return refuse("max_anisotropy", max_anisotropy.to_string(), "it must be 1 to 16");
+    }
+    match settings.background {
+        Background::Environment { blur } if !(0.0..=std::f32::consts::PI).contains(&blur) => {
+            return refuse("blur", blur.to_string(), "it must be 0 to pi radians");
+        }
+        Background::Color(color) if !color.is_finite() => {
+            return refuse("background", color.to_string(), "it must be finite");
+        }
+        _ => {}
+    }
+    if !(camera.yfov > 0.0 && camera.yfov < std::f32::consts::PI) {
+        return refuse("yfov", camera.yfov.to_string(), "it must lie between 0 and pi radians");
+    }
+    if !camera.transform.is_finite() {
+        return refuse("camera", camera.transform.to_string(), "it must be finite");
+    }
+    Ok(())
+}
+
+fn lets_light_through(material: &RenderMaterial) -> bool {
+    material.alpha_mode != AlphaMode::Opaque || material.transmissive
+}
+
+struct Renderer<'a> {
+    scene: &'a RenderScene,
+    settings: &'a Settings,
+    /// Whether any material lets shadow rays through.
+    cutouts: bool,
+}
+
+/// Which of a pixel's samples is taken.
+#[derive(Clone, Copy)]
+struct Sample {
+    index: u32,
+    seed: u32,
+}
+
+impl Renderer<'_> {
+    fn pixel(&self, picture: &PictureCamera, x: u32, y: u32) -> Vec3 {
+        let seed = pixel_seed(x, y);
+        let count = self.settings.samples_per_pixel;
+        let sum: Vec3 = (0..count)
+            .map(|index| {
+                let place = Vec2::new(x as f32, y as f32) + sample_2d(index, PIXEL, seed);
+                self.radiance(&picture.ray(place.x, place.y), Sample { index, seed })
+            })
+            .sum();
+        sum / count as f32
+    }
+
+    /// Radiance along a ray, surfaces that let light through composited front to back.
+    fn radiance(&self, ray: &CameraRay, sample: Sample) -> Vec3 {
+        let view = -ray.direction;
+        let mut seen = Vec3::ZERO;
+        let mut through = Vec3::ONE;
+        let mut start = 0.0;
+        for _ in 0..MAX_LAYERS {
+            let bvh = self.scene.geometry.bvh();
+            let Some(hit) = bvh.closest_hit(ray.origin, ray.direction, start, f32::INFINITY) else {
+                return seen + through * self.background(ray.direction, sample);
+            };
+            start = hit.distance;
+            let point = self.scene.geometry.surface_point(&hit, ray);
+            let material = &self.scene.materials[point.material];
+            if !material.double_sided && point.geometric_normal.dot(view) <= 0.0 {
+                continue;
+            }
+            let shading = Shading::new(material, &point, view, self.settings.filtering);
+            if shading.opacity > 0.0 {
+                seen += through * shading.opacity * self.reflected(&shading, &point, &hit, view, sample);
+            }
+            through *= 1.0 - shading.opacity + shading.opacity * shading.transmitted;
+            // Half a code of an 8-bit display.
+            if through.max_element() < 1.0 / 512.0 {
+                break;
+            }
+        }
+        seen
+    }
+
+    fn reflected(
+        &self,
+        shading: &Shading,
+        point: &SurfacePoint,
+        hit: &Hit,
+        view: Vec3,
+        sample: Sample,
+    ) -> Vec3 {
+        let mut sum = shading.emitted;
+        let to_shading = shading.frame.transpose();
+        for light in &self.scene.lights {
+            let Some(light) = incident(light, point.position) else { continue };
+            let reflected = shading.reflected(to_shading * light.direction) * light.irradiance;
+            if reflected.max_element() > 0.0 {
+                sum += reflected * self.visibility(point, hit, view, light.direction, light.distance);
+            }
+        }
+        if let Some(surroundings) = &self.scene.surroundings {
+            let diffuse = shading.diffuse * FRAC_1_PI * surroundings.irradiance(shading.frame.z_axis);
+            let specular = self.environment_specular(shading, surroundings, sample);
+            sum += shading.occlusion * (diffuse + specular);
+        }
+        sum
+    }
+
+    /// The environment in the specular lobe: as many samples of visible normals as of the environment,
+    /// combined by the balance heuristic (Veach. Robust Monte Carlo Methods. 1997, section 9.2.2).
+    fn environment_specular(&self, shading: &Shading, surroundings: &Surroundings, sample: Sample) -> Vec3 {
+        let count = self.settings.env_samples;
+        let environment = &surroundings.environment;
+        let to_shading = shading.frame.transpose();
+        let contribution = |u: Vec3, world: Vec3, environment_pdf: f32| -> Vec3 {
+            if u.z <= 0.0 {
+                return Vec3::ZERO;
+            }
+            let h = (u + shading.v).normalize();
+            let lobe_pdf = ggx_vndf_pdf(shading.v, h, shading.alpha_t, shading.alpha_b)
+                / (4.0 * shading.v.dot(h)).max(f32::MIN_POSITIVE);
+            shading.specular(u) * u.z * environment.radiance(world) / (lobe_pdf + environment_pdf)
+        };
+
+        let mut sum = Vec3::ZERO;
+        for i in sample.index * count..(sample.index + 1) * count {
+            let xi = sample_2d(i, LOBE, sample.seed);
+            let h = ggx_vndf_sample(shading.v, shading.alpha_t, shading.alpha_b, xi);
+            let u = 2.0 * shading.v.dot(h) * h - shading.v;
+            let world = shading.frame * u;
+            sum += contribution(u, world, environment.pdf(world));
+
+            let (world, pdf) = environment.sample(sample_2d(i, ENVIRONMENT, sample.seed));
+            sum += contribution(to_shading * world, world, pdf);
+        }
+        if count == 0 { Vec3::ZERO } else { sum / count as f32 }
+    }
+
+    /// The share of a light that reaches a point.
+    fn visibility(
+        &self,
+        point: &SurfacePoint,
+        hit: &Hit,
+        view: Vec3,
+        direction: Vec3,
+        distance: f32,
+    ) -> Vec3 {
+        if !self.settings.shadows {
+            return Vec3::ONE;
+        }
+        let geometry = &self.scene.geometry;
+        let facing = if point.geometric_normal.dot(view) < 0.0 { -1.0 } else { 1.0 };
+        let origin = geometry.shadow_origin(hit, facing * point.geometric_normal);
+        if !self.cutouts {
+            return Vec3::splat(f32::from(u8::from(
+                !geometry.bvh().any_hit(origin, direction, 0.0, distance),
+            )));
+        }
+        let ray = CameraRay { origin, direction, direction_dx: Vec3::ZERO, direction_dy: Vec3::ZERO };
+        let mut through = Vec3::ONE;
+        let mut start = 0.0;
+        for _ in 0..MAX_LAYERS {
+            let Some(hit) = geometry.bvh().closest_hit(origin, direction, start, distance) else {
+                return through;
+            };
+            start = hit.distance;
+            let material = &self.scene.materials[geometry.material(hit.triangle)];
+            if !lets_light_through(material) {
+                return Vec3::ZERO;
+            }
+            let point = geometry.surface_point(&hit, &ray);
+            through *= shadow_transmittance(material, &point, TextureFiltering::Level0);
+            if through == Vec3::ZERO {
+                return Vec3::ZERO;
+            }
+        }
+        Vec3::ZERO
+    }
+
+    fn background(&self, direction: Vec3, sample: Sample) -> Vec3 {
+        let blur = match self.settings.background {
+            Background::Color(color) => return color,
+            Background::Environment { blur } => blur,
+        };
+        let Some(surroundings) = &self.scene.surroundings else { return Vec3::ZERO };
+        if blur == 0.0 {
+            return surroundings.environment.radiance(direction);
+        }
+
+        // Uniform over the spherical cap of half angle `blur`.
+        let xi = sample_2d(sample.index, BACKDROP, sample.seed);
+        let z = 1.0 - xi.x * (1.0 - libm::cosf(blur));
+        let radius = (1.0 - z * z).max(0.0).sqrt();
+        let (sin, cos) = libm::sincosf(TAU * xi.y);
+        let (t, b) = direction.any_orthonormal_pair();
+        surroundings.environment.radiance(radius * cos * t + radius * sin * b + z * direction)
+    }
+}

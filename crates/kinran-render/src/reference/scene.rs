@@ -1,0 +1,193 @@
+//! A scene as the renderer needs it.
+
+use super::{Geometry, MipTexture};
+use crate::Error;
+use glam::{Mat3, Vec2, Vec3, Vec4};
+use kinran_image::Transfer;
+use kinran_scene::{AlphaMode, Environment, Light, Material, Scene, TextureRef};
+use kinran_shading::sh::{Sh9, sh_convolve_cosine, sh_evaluate};
+use std::{collections::HashMap, sync::Arc};
+
+/// A texture in its place on a mesh.
+#[derive(Clone, Debug)]
+pub struct BoundTexture {
+    /// The texels.
+    pub texture: Arc<MipTexture>,
+    /// Which of the mesh's UV sets: 0 or 1.
+    pub uv_set: usize,
+    /// Maps the mesh's UV to the texture's.
+    pub transform: Mat3,
+}
+
+/// Normals and roughness of a surface. Which filter made their mips is not the renderer's business.
+#[derive(Clone, Debug)]
+pub struct SurfaceTextures {
+    /// R and G hold x and y of the tangent-space normal, mapped from [-1, 1] to [0, 1], +Y up, any normal
+    /// scale applied. z is reconstructed after filtering, as shaders do with BC5.
+    pub normal: BoundTexture,
+    /// RGB hold an aniso texel (see [`kinran_shading::aniso_encode`]): squared roughness in the frame
+    /// `M_n x, M_n y` of the normal in `normal`. It is filtered as it is encoded, then decoded.
+    pub aniso: BoundTexture,
+}
+
+/// A material with its textures.
+#[derive(Clone, Debug)]
+pub struct RenderMaterial {
+    /// Normals and roughness; `None` where the mesh's normals and an isotropic roughness will do.
+    pub surface: Option<SurfaceTextures>,
+    /// Linear RGBA, multiplied with `base_color`.
+    pub base_color_factor: Vec4,
+    /// Linear RGBA.
+    pub base_color: Option<BoundTexture>,
+    /// Multiplied with B of `metallic_roughness`.
+    pub metallic_factor: f32,
+    /// Perceptual roughness, multiplied with G of `metallic_roughness`. Unused where there is a `surface`.
+    pub roughness_factor: f32,
+    /// G perceptual roughness, B metallic.
+    pub metallic_roughness: Option<BoundTexture>,
+    /// R occlusion.
+    pub occlusion: Option<BoundTexture>,
+    /// 0 to 1: how much of `occlusion` counts.
+    pub occlusion_strength: f32,
+    /// Linear radiance, multiplied with `emissive`.
+    pub emissive_factor: Vec3,
+    /// Linear RGB.
+    pub emissive: Option<BoundTexture>,
+    /// What alpha does.
+    pub alpha_mode: AlphaMode,
+    /// Both sides are lit; otherwise back faces are invisible.
+    pub double_sided: bool,
+    /// Light that is not reflected passes through unbent, tinted by the base colour: thin clear glass.
+    pub transmissive: bool,
+}
+
+/// Light from all around and its order-2 irradiance.
+pub struct Surroundings {
+    /// Radiance and its sampling.
+    pub environment: Environment,
+    irradiance: Sh9,
+}
+
+impl Surroundings {
+    /// Projects the environment on spherical harmonics.
+    pub fn new(environment: Environment) -> Self {
+        let irradiance = sh_convolve_cosine(&environment.spherical_harmonics());
+        Surroundings { environment, irradiance }
+    }
+
+    /// Irradiance on a surface with unit normal `n`, never negative.
+    pub fn irradiance(&self, n: Vec3) -> Vec3 {
+        sh_evaluate(&self.irradiance, n).max(Vec3::ZERO)
+    }
+}
+
+/// All that [`render`](super::render) draws. Cloning shares geometry and textures, so that one scene can be
+/// drawn with several [`SurfaceTextures`].
+#[derive(Clone)]
+pub struct RenderScene {
+    /// World-space triangles.
+    pub geometry: Arc<Geometry>,
+    /// Materials, indexed as in the [`Scene`].
+    pub materials: Vec<RenderMaterial>,
+    /// Punctual lights.
+    pub lights: Vec<Light>,
+    /// Light from all around; `None` is darkness.
+    pub surroundings: Option<Arc<Surroundings>>,
+}
+
+impl RenderScene {
+    /// Prepares a scene. `surfaces` holds one entry for each of the scene's materials.
+    ///
+    /// `KHR_materials_transmission`, which [`Material`] does not represent, makes a material
+    /// [`transmissive`](RenderMaterial::transmissive).
+    ///
+    /// # Errors
+    /// Those of [`Geometry::new`], and [`Error::Scene`] when `surfaces` is not as long as the materials or a
+    /// texture's image is missing.
+    pub fn new(
+        scene: &Scene,
+        surfaces: Vec<Option<SurfaceTextures>>,
+        environment: Option<Environment>,
+    ) -> Result<Self, Error> {
+        if surfaces.len() != scene.materials.len() {
+            return Err(Error::Scene(format!(
+                "{} surfaces were given for {} materials; give one (or none) for each",
+                surfaces.len(),
+                scene.materials.len()
+            )));
+        }
+        let mut loader = TextureLoader { scene, loaded: HashMap::new() };
+        let materials = scene.materials.iter().zip(surfaces).map(|(m, surface)| loader.material(m, surface));
+        let materials = materials.collect::<Result<_, _>>()?;
+        Ok(RenderScene {
+            geometry: Arc::new(Geometry::new(scene)?),
+            materials,
+            lights: scene.lights.clone(),
+            surroundings: environment.map(|e| Arc::new(Surroundings::new(e))),
+        })
+    }
+}
+
+impl BoundTexture {
+    /// A texture that is `texel` everywhere.
+    pub fn constant(texel: [f32; 4]) -> Self {
+        BoundTexture { texture: Arc::new(MipTexture::constant(texel)), uv_set: 0, transform: Mat3::IDENTITY }
+    }
+
+    /// A texture in the place of a glTF texture.
+    pub fn new(texture: Arc<MipTexture>, place: &TextureRef) -> Self {
+        BoundTexture { texture, uv_set: place.uv_set, transform: place.transform }
+    }
+
+    /// The texture's coordinates from the mesh's.
+    #[inline]
+    pub fn uv(&self, uv: [Vec2; 2]) -> Vec2 {
+        self.transform.transform_point2(uv[self.uv_set])
+    }
+
+    /// The texture's coordinates' change from the mesh's.
+    #[inline]
+    pub fn uv_change(&self, change: [Vec2; 2]) -> Vec2 {
+        self.transform.transform_vector2(change[self.uv_set])
+    }
+}
+
+/// Makes each image's mips once, however many materials use it.
+struct TextureLoader<'a> {
+    scene: &'a Scene,
+    loaded: HashMap<(usize, Transfer, [kinran_scene::Wrap; 2]), Arc<MipTexture>>,
+}
+
+impl TextureLoader<'_> {
+    fn texture(&mut self, place: &TextureRef, transfer: Transfer) -> Result<BoundTexture, Error> {
+        let key = (place.image, transfer, place.wrap);
+        if !self.loaded.contains_key(&key) {
+            let image = self.scene.images.get(place.image).and_then(Option::as_ref).ok_or_else(|| {
+                Error::Scene(format!("image {} is used by a material but was not loaded", place.image))
+            })?;
+            self.loaded.insert(key, Arc::new(MipTexture::from_image(image, transfer, place.wrap)));
+        }
+        Ok(BoundTexture::new(self.loaded[&key].clone(), place))
+    }
+
+    fn material(&mut self, m: &Material, surface: Option<SurfaceTextures>) -> Result<RenderMaterial, Error> {
+        let mut load = |place: &Option<TextureRef>, transfer| {
+            place.as_ref().map(|place| self.texture(place, transfer)).transpose()
+        };
+        Ok(RenderMaterial {
+            surface,
+            base_color_factor: m.base_color_factor,
+            base_color: load(&m.base_color, Transfer::Srgb)?,
+            metallic_factor: m.metallic_factor,
+            roughness_factor: m.roughness_factor,
+            metallic_roughness: load(&m.metallic_roughness, Transfer::Linear)?,
+            occlusion: load(&m.occlusion, Transfer::Linear)?,
+            occlusion_strength: m.occlusion_strength,
+            emissive_factor: m.emissive_factor,
+            emissive: load(&m.emissive, Transfer::Srgb)?,
+            alpha_mode: m.alpha_mode,
+            double_sided: m.double_sided,
+            transmissive: m.ignored_extensions.iter().any(|e| e == "KHR_materials_transmission"),
+        })
+    }
+}

@@ -1,0 +1,180 @@
+//! A surface's material at one point, and how it reflects.
+//!
+//! The model is glTF's metallic-roughness: a GGX lobe with height-correlated Smith masking, Schlick's Fresnel
+//! and multiscatter compensation; under it, for the part that is not metal, a Lambert lobe of what the
+//! specular lobe leaves for the view direction.
+
+use super::{
+    albedo::specular_albedo,
+    geometry::SurfacePoint,
+    render::TextureFiltering,
+    scene::{BoundTexture, RenderMaterial},
+};
+use glam::{Mat3, Vec3, Vec4, Vec4Swizzles};
+use kinran_scene::AlphaMode;
+use kinran_shading::{
+    alpha_from_roughness, aniso_decode, ggx_aniso_d, m_n, multiscatter_compensation, normal_from_xy,
+    schlick_f, smith_aniso_v,
+};
+use std::f32::consts::FRAC_1_PI;
+
+/// Reflectance of a dielectric at normal incidence (glTF 2.0, appendix B).
+const DIELECTRIC_F0: f32 = 0.04;
+
+/// Smallest cosine between shading normal and view; chosen by eye, below it grazing lobes only alias.
+const N_V_MIN: f32 = 1e-3;
+
+/// A material evaluated for one point and one view.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shading {
+    /// Columns: the direction of `alpha_t`, that of `alpha_b`, the shading normal; orthonormal, world space.
+    pub(crate) frame: Mat3,
+    /// The view in `frame`.
+    pub(crate) v: Vec3,
+    pub(crate) alpha_t: f32,
+    pub(crate) alpha_b: f32,
+    f0: Vec3,
+    compensation: Vec3,
+    /// Albedo of the Lambert lobe.
+    pub(crate) diffuse: Vec3,
+    /// Share of the light behind the surface that comes through.
+    pub(crate) transmitted: Vec3,
+    /// 0 to 1, for ambient light only.
+    pub(crate) occlusion: f32,
+    pub(crate) emitted: Vec3,
+    /// 0 is a hole, 1 is opaque.
+    pub(crate) opacity: f32,
+}
+
+/// A texture at a point as `filtering` says; white where there is none.
+#[inline]
+fn sample(texture: &Option<BoundTexture>, point: &SurfacePoint, filtering: TextureFiltering) -> Vec4 {
+    texture.as_ref().map_or(Vec4::ONE, |t| sample_bound(t, point, filtering))
+}
+
+#[inline]
+fn sample_bound(t: &BoundTexture, point: &SurfacePoint, filtering: TextureFiltering) -> Vec4 {
+    let uv = t.uv(point.uv);
+    match filtering {
+        TextureFiltering::Level0 => t.texture.sample_level(uv, 0),
+        TextureFiltering::Mips { max_anisotropy } => {
+            let (dx, dy) = (t.uv_change(point.uv_dx), t.uv_change(point.uv_dy));
+            t.texture.sample_grad(uv, dx, dy, max_anisotropy)
+        }
+    }
+}
+
+/// Base colour and alpha.
+fn base_color(material: &RenderMaterial, point: &SurfacePoint, filtering: TextureFiltering) -> Vec4 {
+    material.base_color_factor * point.color * sample(&material.base_color, point, filtering)
+}
+
+/// How much a surface hides, 0 to 1.
+pub(crate) fn opacity(material: &RenderMaterial, base_color: Vec4) -> f32 {
+    match material.alpha_mode {
+        AlphaMode::Opaque => 1.0,
+        AlphaMode::Mask { cutoff } => f32::from(u8::from(base_color.w >= cutoff)),
+        AlphaMode::Blend => base_color.w.clamp(0.0, 1.0),
+    }
+}
+
+/// The share of light that passes straight through a surface on its way to another one.
+pub(crate) fn shadow_transmittance(
+    material: &RenderMaterial,
+    point: &SurfacePoint,
+    filtering: TextureFiltering,
+) -> Vec3 {
+    let base = base_color(material, point, filtering);
+    let opacity = opacity(material, base);
+    let through = if material.transmissive { base.xyz() * (1.0 - DIELECTRIC_F0) } else { Vec3::ZERO };
+    Vec3::splat(1.0 - opacity) + opacity * through
+}
+
+impl Shading {
+    /// Evaluates `material` at `point`, seen along `view`, the unit direction towards the viewer.
+    ///
+    /// Back faces are the same relief seen from behind: normal, tangent and bitangent all turn around.
+    /// Where the shading normal faces away from the viewer, it is tilted towards the viewer until
+    /// n·v = [`N_V_MIN`]: the relief's far sides are hidden in truth and seen as grazing here.
+    pub(crate) fn new(
+        material: &RenderMaterial,
+        point: &SurfacePoint,
+        view: Vec3,
+        filtering: TextureFiltering,
+    ) -> Self {
+        let base = base_color(material, point, filtering);
+        let metallic_roughness = sample(&material.metallic_roughness, point, filtering);
+        let metallic = (material.metallic_factor * metallic_roughness.z).clamp(0.0, 1.0);
+
+        // Normal and roughness, in the tangent frame of the mesh.
+        let (n, texel) = match &material.surface {
+            Some(surface) => {
+                let xy = sample_bound(&surface.normal, point, filtering).xy() * 2.0 - 1.0;
+                (normal_from_xy(xy.x, xy.y), sample_bound(&surface.aniso, point, filtering).xyz())
+            }
+            None => {
+                let roughness = (material.roughness_factor * metallic_roughness.y).clamp(0.0, 1.0);
+                let alpha = alpha_from_roughness(roughness);
+                (Vec3::Z, Vec3::new(alpha, 0.5, alpha))
+            }
+        };
+
+        // To world space. The mesh's frame may be skewed by interpolation; what comes out is orthonormal.
+        let front = if point.geometric_normal.dot(view) < 0.0 { -1.0 } else { 1.0 };
+        let to_world = point.tangent_frame * front;
+        let mut normal = (to_world * n).normalize_or(front * point.geometric_normal);
+        if normal.dot(view) < N_V_MIN {
+            normal = (normal + (N_V_MIN - normal.dot(view)) * view).normalize();
+        }
+        let basis = m_n(n);
+        let (tangent, bitangent) = orthonormalize(to_world * basis.x_axis, to_world * basis.y_axis, normal);
+        let aniso = aniso_decode(texel, tangent, bitangent);
+        let (alpha_t, alpha_b) = (aniso.alpha_t, aniso.alpha_b);
+        let frame = Mat3::from_cols(aniso.tangent, aniso.bitangent, normal);
+        let v = frame.transpose() * view;
+
+        let f0 = Vec3::splat(DIELECTRIC_F0).lerp(base.xyz(), metallic);
+        let inside = 1.0 - specular_albedo(DIELECTRIC_F0, v.z, alpha_t, alpha_b);
+        let passed = base.xyz() * (1.0 - metallic) * inside;
+        let occlusion = sample(&material.occlusion, point, filtering).x;
+        Shading {
+            frame,
+            v,
+            alpha_t,
+            alpha_b,
+            f0,
+            compensation: multiscatter_compensation(f0, v.z, alpha_t, alpha_b),
+            diffuse: if material.transmissive { Vec3::ZERO } else { passed },
+            transmitted: if material.transmissive { passed } else { Vec3::ZERO },
+            occlusion: 1.0 + material.occlusion_strength * (occlusion - 1.0),
+            emitted: material.emissive_factor * sample(&material.emissive, point, filtering).xyz(),
+            opacity: opacity(material, base),
+        }
+    }
+
+    /// The specular lobe for a light along `u` in the shading frame, per steradian, without the cosine.
+    #[inline]
+    pub(crate) fn specular(&self, u: Vec3) -> Vec3 {
+        if u.z <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let h = (u + self.v).normalize();
+        let d = ggx_aniso_d(h, self.alpha_t, self.alpha_b);
+        let visibility = smith_aniso_v(u, self.v, self.alpha_t, self.alpha_b);
+        d * visibility * schlick_f(self.f0, self.v.dot(h)) * self.compensation
+    }
+
+    /// All of the BRDF for a light along `u` in the shading frame, per steradian, times the cosine.
+    #[inline]
+    pub(crate) fn reflected(&self, u: Vec3) -> Vec3 {
+        (self.diffuse * FRAC_1_PI + self.specular(u)) * u.z.max(0.0)
+    }
+}
+
+/// Unit vectors along `tangent` and `bitangent`, orthogonal to each other and to the unit vector `normal`.
+/// Handedness is kept; what is degenerate is replaced.
+fn orthonormalize(tangent: Vec3, bitangent: Vec3, normal: Vec3) -> (Vec3, Vec3) {
+    let t = (tangent - normal * normal.dot(tangent)).normalize_or(normal.any_orthonormal_vector());
+    let b = normal.cross(t);
+    (t, if b.dot(bitangent) < 0.0 { -b } else { b })
+}

@@ -1,0 +1,47 @@
+use std::path::{Path, PathBuf};
+
+/// Why a scene, a document or an environment could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The operating system refused to read or write the file.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The file's content is not what its format demands.
+    #[error("{}: {reason}", path.display())]
+    Malformed {
+        /// The file, or the name its bytes came under.
+        path: PathBuf,
+        /// The place in the file, what is wrong there, and what would be right.
+        reason: String,
+    },
+    /// The file is sound but needs something that is not implemented.
+    #[error("{}: {reason}", path.display())]
+    Unsupported {
+        /// The file, or the name its bytes came under.
+        path: PathBuf,
+        /// What it needs, and what to do about it.
+        reason: String,
+    },
+    /// An image could not be read; the message names it.
+    #[error(transparent)]
+    Image(#[from] kinran_image::Error),
+}
+
+impl Error {
+    pub(crate) fn io(path: impl AsRef<Path>, source: std::io::Error) -> Self {
+        Error::Io { path: path.as_ref().to_path_buf(), source }
+    }
+
+    pub(crate) fn malformed(path: impl AsRef<Path>, reason: impl Into<String>) -> Self {
+        Error::Malformed { path: path.as_ref().to_path_buf(), reason: reason.into() }
+    }
+
+    pub(crate) fn unsupported(path: impl AsRef<Path>, reason: impl Into<String>) -> Self {
+        Error::Unsupported { path: path.as_ref().to_path_buf(), reason: reason.into() }
+    }
+}

@@ -1,0 +1,24 @@
+//! glTF scenes in and out.
+//!
+//! [`Scene`] is a flat, validated form of a glTF document: everything an index points at exists, all
+//! vertex data is finite, every primitive has normals and tangents. [`Document`] is the document itself,
+//! for tools that replace its textures and leave everything else as it was.
+
+mod accessor;
+mod container;
+mod document;
+mod environment;
+mod error;
+mod frame;
+mod json;
+mod load;
+mod scene;
+mod studio;
+mod tangent;
+
+pub use document::{Document, Object, Slot, TextureExtension};
+pub use environment::Environment;
+pub use error::Error;
+pub use scene::{
+    AlphaMode, Anisotropy, Camera, Instance, Light, LightKind, Material, Primitive, Scene, TextureRef, Wrap,
+};

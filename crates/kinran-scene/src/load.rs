@@ -1,0 +1,871 @@
+//! Reads a glTF document into a [`Scene`].
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, DVec4, Mat3, Quat, Vec2, Vec3, Vec4};
+use kinran_image::{Channels, Format, Image, Pixels, Texture};
+use rayon::prelude::*;
+use serde::Deserialize;
+
+use crate::accessor::Accessors;
+use crate::container::{Resolver, beside, fetch, read_regular_file, split};
+use crate::{
+    AlphaMode, Anisotropy, Camera, Error, Instance, Light, LightKind, Material, Primitive, Scene, TextureRef,
+    Wrap, json, tangent,
+};
+
+/// Extensions that may stand in `extensionsRequired`: those this module reads, and those that change how
+/// a surface looks but leave the rest of the document as it is; the latter are listed in
+/// [`Material::ignored_extensions`] or in [`Scene::warnings`].
+const ADMITTED_EXTENSIONS: [&str; 22] = [
+    "EXT_mesh_gpu_instancing",
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_basisu",
+    "KHR_texture_transform",
+    "KHR_xmp_json_ld",
+    "MSFT_texture_dds",
+    "KHR_animation_pointer",
+];
+
+/// Material extensions that [`Material`] represents.
+const READ_MATERIAL_EXTENSIONS: [&str; 2] = ["KHR_materials_anisotropy", "KHR_materials_emissive_strength"];
+
+/// Texture extensions whose image is taken when a texture has no core one.
+const TEXTURE_EXTENSIONS: [&str; 2] = ["KHR_texture_basisu", "MSFT_texture_dds"];
+
+/// Texels that all images of a scene may have together: four of 16384 by 16384, 4 GiB as RGBA8.
+const TEXELS_MAX: u64 = 1 << 30;
+
+/// Instances that one scene may have; at 80 bytes each, 1.3 GB.
+const INSTANCES_MAX: usize = 1 << 24;
+
+impl Scene {
+    /// Reads a `.gltf` (with its buffers and images beside it, or in `data:` URIs) or a `.glb`.
+    ///
+    /// The document's default scene is taken, in its rest pose, with the default material variant. Points
+    /// and lines are left out. Missing normals become flat ones and missing tangents MikkTSpace ones of
+    /// the UV set that the normal map uses (glTF 2.0 section 3.7.2.1). A texture's PNG or JPEG is preferred
+    /// to its KTX2 or DDS alternative. What was left out or mended stands in [`Scene::warnings`].
+    ///
+    /// # Errors
+    /// One that names the file and the place in it: files that are missing, truncated or no glTF, indices
+    /// and ranges that point nowhere, numbers that are not finite, required extensions that are not
+    /// implemented. Memory stays in proportion to the files' sizes.
+    pub fn load(path: impl AsRef<Path>) -> Result<Scene, Error> {
+        let path = path.as_ref();
+        let bytes = read_regular_file(path).map_err(|error| Error::io(path, error))?;
+        Scene::from_bytes(path, &bytes, &beside(path))
+    }
+
+    /// Reads a document from memory. `name` stands for it in messages; `resolve` gives the bytes of a
+    /// relative, percent-decoded path that the document names.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn from_bytes(name: &Path, bytes: &[u8], resolve: &Resolver<'_>) -> Result<Scene, Error> {
+        let container = split(name, bytes)?;
+        let root: json::Root = serde_json::from_slice(container.json)
+            .map_err(|error| Error::malformed(name, format!("the JSON does not describe glTF: {error}")))?;
+        admit(name, &root)?;
+        let buffers = load_buffers(name, &root, container.bin, resolve)?;
+        let mut loader = Loader {
+            name,
+            root: &root,
+            accessors: Accessors::new(name, &root, &buffers),
+            first_use: Vec::new(),
+            scene: Scene::default(),
+        };
+        loader.first_use = loader.first_uses();
+        loader.materials()?;
+        let meshes = loader.meshes()?;
+        loader.nodes(&meshes)?;
+        loader.images(resolve)?;
+        Ok(loader.scene)
+    }
+}
+
+/// Refuses documents that cannot be read faithfully.
+fn admit(name: &Path, root: &json::Root) -> Result<(), Error> {
+    if !root.asset.version.starts_with("2.") {
+        return Err(Error::unsupported(
+            name,
+            format!("glTF version {:?}; export it as glTF 2.0", root.asset.version),
+        ));
+    }
+    let Some(extension) =
+        (root.extensions_required).iter().find(|name| !ADMITTED_EXTENSIONS.contains(&name.as_str()))
+    else {
+        return Ok(());
+    };
+    let remedy = match extension.as_str() {
+        "KHR_draco_mesh_compression" => "export it without Draco mesh compression, or decompress it first",
+        "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+            "export it without meshopt compression, or decompress it first"
+        }
+        "EXT_texture_webp" | "EXT_texture_avif" => "convert its textures to PNG or JPEG",
+        _ => "export it without this extension, or with it as optional",
+    };
+    Err(Error::unsupported(name, format!("requires the extension {extension}, which is not read; {remedy}")))
+}
+
+/// All buffers, each as long as its `byteLength` claims or longer.
+fn load_buffers(
+    name: &Path,
+    root: &json::Root,
+    bin: Option<&[u8]>,
+    resolve: &Resolver<'_>,
+) -> Result<Vec<Vec<u8>>, Error> {
+    (root.buffers.iter().enumerate())
+        .map(|(i, buffer)| {
+            let what = format!("buffer {i}");
+            let bytes = match (&buffer.uri, bin) {
+                (Some(uri), _) => fetch(name, &what, uri, resolve)?,
+                (None, Some(bin)) if i == 0 => bin.to_vec(),
+                _ => return Err(Error::malformed(name, format!("{what} has no uri and no GLB chunk to be"))),
+            };
+            if (bytes.len() as u64) < buffer.byte_length {
+                let (claimed, got) = (buffer.byte_length, bytes.len());
+                return Err(Error::malformed(
+                    name,
+                    format!("{what} claims {claimed} bytes and there are {got}: it is truncated"),
+                ));
+            }
+            Ok(bytes)
+        })
+        .collect()
+}
+
+struct Loader<'a> {
+    name: &'a Path,
+    root: &'a json::Root,
+    accessors: Accessors<'a>,
+    /// For each image the first one with the same source.
+    first_use: Vec<usize>,
+    scene: Scene,
+}
+
+impl Loader<'_> {
+    fn error(&self, reason: impl Into<String>) -> Error {
+        Error::malformed(self.name, reason)
+    }
+
+    fn warn(&mut self, warning: String) {
+        self.scene.warnings.push(warning);
+    }
+
+    fn finite<const N: usize>(&self, values: [f32; N], what: &str) -> Result<[f32; N], Error> {
+        if values.iter().all(|x| x.is_finite()) {
+            return Ok(values);
+        }
+        Err(self.error(format!("{what} is {values:?}; every component must be a finite number")))
+    }
+
+    /// A factor that the specification keeps within [0, 1].
+    fn unit(&mut self, value: f32, what: &str) -> Result<f32, Error> {
+        let [value] = self.finite([value], what)?;
+        if !(0.0..=1.0).contains(&value) {
+            self.warn(format!("{what} is {value}, outside 0 to 1; it was clamped"));
+        }
+        Ok(value.clamp(0.0, 1.0))
+    }
+
+    fn first_uses(&self) -> Vec<usize> {
+        let source = |i: usize| (&self.root.images[i].uri, self.root.images[i].buffer_view);
+        let mut first = std::collections::HashMap::new();
+        (0..self.root.images.len()).map(|i| *first.entry(source(i)).or_insert(i)).collect()
+    }
+
+    fn materials(&mut self) -> Result<(), Error> {
+        let root = self.root;
+        for (i, material) in root.materials.iter().enumerate() {
+            let material = self.material(material, i)?;
+            self.scene.materials.push(material);
+        }
+        let default_used = root
+            .meshes
+            .iter()
+            .flat_map(|mesh| &mesh.primitives)
+            .any(|primitive| primitive.material.is_none());
+        if default_used || root.materials.is_empty() {
+            let mut material = self.material(&json::Material::default(), root.materials.len())?;
+            material.name = "default".into();
+            self.scene.materials.push(material);
+        }
+        Ok(())
+    }
+
+    fn material(&mut self, material: &json::Material, index: usize) -> Result<Material, Error> {
+        let name = material.name.clone().unwrap_or_else(|| format!("material {index}"));
+        let what = match &material.name {
+            Some(name) => format!("material {index} \"{name}\""),
+            None => format!("material {index}"),
+        };
+        let pbr = &material.pbr_metallic_roughness;
+
+        let anisotropy: Option<json::Anisotropy> =
+            self.extension(&material.extensions, "KHR_materials_anisotropy", &what)?;
+        let anisotropy = match anisotropy {
+            Some(anisotropy) => Some(Anisotropy {
+                strength: self
+                    .unit(anisotropy.anisotropy_strength, &format!("{what}: anisotropyStrength"))?,
+                rotation: {
+                    let what = format!("{what}: anisotropyRotation");
+                    self.finite([anisotropy.anisotropy_rotation], &what)?[0]
+                },
+                texture: self
+                    .texture(&anisotropy.anisotropy_texture, &format!("{what}: anisotropyTexture"))?,
+            }),
+            None => None,
+        };
+        let strength: Option<json::EmissiveStrength> =
+            self.extension(&material.extensions, "KHR_materials_emissive_strength", &what)?;
+        let strength = strength.map_or(1.0, |extension| extension.emissive_strength);
+        let emissive = Vec3::from(material.emissive_factor) * strength;
+
+        if material.extensions.contains_key("KHR_materials_pbrSpecularGlossiness") {
+            self.warn(format!(
+                "{what} is specular-glossiness; its metallic-roughness fallback is taken, convert it for the right look"
+            ));
+        }
+        Ok(Material {
+            name,
+            base_color_factor: self
+                .finite(pbr.base_color_factor, &format!("{what}: baseColorFactor"))?
+                .into(),
+            base_color: self.texture(&pbr.base_color_texture, &format!("{what}: baseColorTexture"))?,
+            metallic_factor: self.unit(pbr.metallic_factor, &format!("{what}: metallicFactor"))?,
+            roughness_factor: self.unit(pbr.roughness_factor, &format!("{what}: roughnessFactor"))?,
+            metallic_roughness: self
+                .texture(&pbr.metallic_roughness_texture, &format!("{what}: metallicRoughnessTexture"))?,
+            normal: self.texture(&material.normal_texture, &format!("{what}: normalTexture"))?,
+            normal_scale: {
+                let scale = material.normal_texture.as_ref().map_or(1.0, |info| info.scale);
+                self.finite([scale], &format!("{what}: normalTexture.scale"))?[0]
+            },
+            occlusion: self.texture(&material.occlusion_texture, &format!("{what}: occlusionTexture"))?,
+            occlusion_strength: {
+                let strength = material.occlusion_texture.as_ref().map_or(1.0, |info| info.strength);
+                self.unit(strength, &format!("{what}: occlusionTexture.strength"))?
+            },
+            emissive_factor: self.finite(emissive.to_array(), &format!("{what}: emissiveFactor"))?.into(),
+            emissive: self.texture(&material.emissive_texture, &format!("{what}: emissiveTexture"))?,
+            anisotropy,
+            alpha_mode: match material.alpha_mode {
+                json::AlphaMode::Opaque => AlphaMode::Opaque,
+                json::AlphaMode::Mask => AlphaMode::Mask {
+                    cutoff: self.finite([material.alpha_cutoff], &format!("{what}: alphaCutoff"))?[0],
+                },
+                json::AlphaMode::Blend => AlphaMode::Blend,
+            },
+            double_sided: material.double_sided,
+            ignored_extensions: (material.extensions.keys())
+                .filter(|name| !READ_MATERIAL_EXTENSIONS.contains(&name.as_str()))
+                .cloned()
+                .collect(),
+        })
+    }
+
+    fn extension<'de, T: Deserialize<'de>>(
+        &self,
+        extensions: &'de json::Extensions,
+        extension: &str,
+        what: &str,
+    ) -> Result<Option<T>, Error> {
+        let Some(value) = extensions.get(extension) else { return Ok(None) };
+        T::deserialize(value)
+            .map(Some)
+            .map_err(|error: serde_json::Error| self.error(format!("{what}: {extension}: {error}")))
+    }
+
+    fn texture(&mut self, info: &Option<json::TextureInfo>, what: &str) -> Result<Option<TextureRef>, Error> {
+        let Some(info) = info else { return Ok(None) };
+        let root = self.root;
+        let texture = (root.textures.get(info.index))
+            .ok_or_else(|| self.error(format!("{what}: texture {} does not exist", info.index)))?;
+
+        let image = (texture.source).or_else(|| {
+            TEXTURE_EXTENSIONS
+                .iter()
+                .find_map(|name| texture.extensions.get(*name)?.get("source")?.as_u64())
+                .and_then(|source| usize::try_from(source).ok())
+        });
+        let Some(image) = image else {
+            let names: Vec<&str> = texture.extensions.keys().map(String::as_str).collect();
+            return Err(Error::unsupported(
+                self.name,
+                format!(
+                    "{what}: texture {} has no image that can be read (extensions: {}); give it a PNG or JPEG source",
+                    info.index,
+                    if names.is_empty() { "none".into() } else { names.join(", ") }
+                ),
+            ));
+        };
+        let image = *(self.first_use.get(image))
+            .ok_or_else(|| self.error(format!("{what}: image {image} does not exist")))?;
+
+        let (mut uv_set, mut transform) = (info.tex_coord, Mat3::IDENTITY);
+        if let Some(extension) = &info.extensions.transform {
+            uv_set = extension.tex_coord.unwrap_or(uv_set);
+            transform = texture_transform(extension);
+            let what = format!("{what}: KHR_texture_transform");
+            self.finite(transform.to_cols_array(), &what)?;
+        }
+        if uv_set > 1 {
+            self.warn(format!(
+                "{what} uses TEXCOORD_{uv_set}; only sets 0 and 1 are read, so it was left out"
+            ));
+            return Ok(None);
+        }
+
+        let wrap = match texture.sampler {
+            None => [Wrap::Repeat; 2],
+            Some(sampler) => {
+                let sampler = (root.samplers.get(sampler))
+                    .ok_or_else(|| self.error(format!("{what}: sampler {sampler} does not exist")))?;
+                [self.wrap(sampler.wrap_s, what)?, self.wrap(sampler.wrap_t, what)?]
+            }
+        };
+        Ok(Some(TextureRef { image, uv_set, transform, wrap }))
+    }
+
+    fn wrap(&self, mode: u32, what: &str) -> Result<Wrap, Error> {
+        match mode {
+            10497 => Ok(Wrap::Repeat),
+            33071 => Ok(Wrap::Clamp),
+            33648 => Ok(Wrap::Mirror),
+            _ => Err(self.error(format!("{what}: wrap mode {mode}; 10497, 33071 or 33648 are allowed"))),
+        }
+    }
+
+    /// Reads every mesh; gives the scene's primitives of each.
+    fn meshes(&mut self) -> Result<Vec<std::ops::Range<usize>>, Error> {
+        let root = self.root;
+        let mut ranges = Vec::with_capacity(root.meshes.len());
+        for (m, mesh) in root.meshes.iter().enumerate() {
+            let first = self.scene.primitives.len();
+            for (p, primitive) in mesh.primitives.iter().enumerate() {
+                let what = match &mesh.name {
+                    Some(name) => format!("mesh {m} \"{name}\", primitive {p}"),
+                    None => format!("mesh {m}, primitive {p}"),
+                };
+                if let Some(primitive) = self.primitive(primitive, &what)? {
+                    self.scene.primitives.push(primitive);
+                }
+            }
+            ranges.push(first..self.scene.primitives.len());
+        }
+        Ok(ranges)
+    }
+
+    fn primitive(&mut self, primitive: &json::Primitive, what: &str) -> Result<Option<Primitive>, Error> {
+        if primitive.mode < 4 {
+            self.warn(format!("{what} consists of points or lines; it was left out"));
+            return Ok(None);
+        }
+        let attributes = &primitive.attributes;
+        let Some(position) = attributes.position else {
+            self.warn(format!("{what} has no POSITION; it was left out"));
+            return Ok(None);
+        };
+        let material = primitive.material.unwrap_or(self.root.materials.len());
+        if material >= self.scene.materials.len() {
+            return Err(self.error(format!("{what}: material {material} does not exist")));
+        }
+        if !primitive.targets.is_empty() {
+            self.warn(format!("{what} has morph targets; it is shown without them"));
+        }
+
+        let positions = self.accessors.floats::<3>(position, &format!("{what}: POSITION"))?;
+        let positions: Vec<Vec3> = positions.into_iter().map(Vec3::from).collect();
+        let mut uvs = [Vec::new(), Vec::new()];
+        for (set, accessor) in [attributes.texcoord_0, attributes.texcoord_1].into_iter().enumerate() {
+            if let Some(accessor) = accessor {
+                let read = self.accessors.floats::<2>(accessor, &format!("{what}: TEXCOORD_{set}"))?;
+                uvs[set] = read.into_iter().map(Vec2::from).collect();
+            }
+        }
+        let colors = match attributes.color_0 {
+            Some(accessor) => self.accessors.colors(accessor, &format!("{what}: COLOR_0"))?,
+            None => Vec::new(),
+        };
+        let normals = match attributes.normal {
+            Some(accessor) => self.accessors.floats::<3>(accessor, &format!("{what}: NORMAL"))?,
+            None => Vec::new(),
+        };
+        let tangents = match attributes.tangent {
+            Some(accessor) => self.accessors.floats::<4>(accessor, &format!("{what}: TANGENT"))?,
+            None => Vec::new(),
+        };
+        let counts = [
+            ("NORMAL", normals.len(), attributes.normal.is_some()),
+            ("TANGENT", tangents.len(), attributes.tangent.is_some()),
+            ("TEXCOORD_0", uvs[0].len(), attributes.texcoord_0.is_some()),
+            ("TEXCOORD_1", uvs[1].len(), attributes.texcoord_1.is_some()),
+            ("COLOR_0", colors.len(), attributes.color_0.is_some()),
+        ];
+        for (attribute, count, present) in counts {
+            if present && count != positions.len() {
+                return Err(self.error(format!(
+                    "{what}: {attribute} has {count} elements and POSITION {}; they must be as many",
+                    positions.len()
+                )));
+            }
+        }
+
+        let triangles = self.triangles(primitive, positions.len(), what)?;
+        if triangles.is_empty() {
+            self.warn(format!("{what} has no triangles; it was left out"));
+            return Ok(None);
+        }
+        let mut primitive = Primitive {
+            positions,
+            normals: normals.into_iter().map(Vec3::from).collect(),
+            tangents: tangents.into_iter().map(Vec4::from).collect(),
+            uvs,
+            colors: colors.into_iter().map(Vec4::from).collect(),
+            triangles,
+            material,
+        };
+        self.complete(&mut primitive, what);
+        Ok(Some(primitive))
+    }
+
+    /// The vertex indices of each triangle (glTF 2.0 section 3.7.2.1, primitive topologies).
+    fn triangles(
+        &mut self,
+        primitive: &json::Primitive,
+        vertex_count: usize,
+        what: &str,
+    ) -> Result<Vec<[u32; 3]>, Error> {
+        let count = match primitive.indices {
+            Some(accessor) => self.root.accessors.get(accessor).map_or(0, |accessor| accessor.count),
+            None => vertex_count as u64,
+        };
+        // Flat normals number the corners of all triangles: a strip's are nearly three times its indices.
+        if count > u64::from(u32::MAX) / 3 || vertex_count as u64 > u64::from(u32::MAX) {
+            return Err(self.error(format!("{what} has {count} indices; split it into smaller primitives")));
+        }
+        let indices = match primitive.indices {
+            Some(accessor) => self.accessors.indices(accessor, &format!("{what}: indices"))?,
+            None => (0..vertex_count as u32).collect(),
+        };
+        if let Some(at) = indices.iter().position(|&i| i as usize >= vertex_count) {
+            return Err(self.error(format!(
+                "{what}: index number {at} is {}, and there are {vertex_count} vertices",
+                indices[at]
+            )));
+        }
+        Ok(match primitive.mode {
+            4 => {
+                if !indices.len().is_multiple_of(3) {
+                    self.warn(format!(
+                        "{what} has {} indices, which is no multiple of three; the last ones were left out",
+                        indices.len()
+                    ));
+                }
+                indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
+            }
+            5 => (indices.windows(3).enumerate())
+                .map(|(i, t)| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[0], t[2], t[1]] })
+                .collect(),
+            6 => indices.windows(2).skip(1).map(|t| [t[0], t[1], indices[0]]).collect(),
+            mode => return Err(self.error(format!("{what} has mode {mode}; 0 to 6 are allowed"))),
+        })
+    }
+
+    /// Brings normals and tangents to unit length and supplies the missing ones.
+    fn complete(&mut self, primitive: &mut Primitive, what: &str) {
+        if primitive.normals.is_empty() {
+            primitive.tangents = Vec::new();
+            tangent::flatten(primitive);
+        }
+        let mut mended = 0;
+        for normal in &mut primitive.normals {
+            *normal = normal.as_dvec3().try_normalize().map_or_else(
+                || {
+                    mended += 1;
+                    Vec3::Z
+                },
+                |unit| unit.as_vec3(),
+            );
+        }
+        if mended > 0 {
+            self.warn(format!("{what}: {mended} normals have no length; they were set to +z"));
+        }
+
+        let material = &self.scene.materials[primitive.material];
+        let uses: Vec<&TextureRef> = material.textures().collect();
+        let tangents_matter = material.normal.is_some() || material.anisotropy.is_some();
+        let tangent_set = uses.first().map_or(0, |texture| texture.uv_set);
+        let missing: Vec<usize> = [0, 1]
+            .into_iter()
+            .filter(|&set| primitive.uvs[set].is_empty() && uses.iter().any(|texture| texture.uv_set == set))
+            .collect();
+        let name = material.name.clone();
+        for set in missing {
+            self.warn(format!(
+                "{what} has no TEXCOORD_{set}, which its material \"{name}\" uses; (0, 0) is taken everywhere"
+            ));
+        }
+
+        if !primitive.tangents.is_empty() {
+            let mut mended = 0;
+            for (tangent, &normal) in primitive.tangents.iter_mut().zip(&primitive.normals) {
+                let sign = if tangent.w < 0.0 { -1.0 } else { 1.0 };
+                *tangent = match tangent.truncate().as_dvec3().try_normalize() {
+                    Some(unit) if unit.as_vec3().cross(normal) != Vec3::ZERO => unit.as_vec3().extend(sign),
+                    _ => {
+                        mended += 1;
+                        tangent::arbitrary(normal)
+                    }
+                };
+            }
+            if mended > 0 {
+                self.warn(format!(
+                    "{what}: {mended} tangents have no length or point along the normal; any direction was taken"
+                ));
+            }
+        } else if !primitive.uvs[tangent_set].is_empty() {
+            tangent::generate(primitive, tangent_set);
+        } else {
+            if tangents_matter {
+                self.warn(format!(
+                    "{what} has neither TANGENT nor TEXCOORD_{tangent_set}, and its material \"{name}\" needs \
+                     tangents; any direction was taken"
+                ));
+            }
+            primitive.tangents = primitive.normals.iter().map(|&n| tangent::arbitrary(n)).collect();
+        }
+    }
+
+    /// Walks the scene's tree and places meshes, lights and cameras.
+    fn nodes(&mut self, meshes: &[std::ops::Range<usize>]) -> Result<(), Error> {
+        let root = self.root;
+        let mut stack: Vec<(usize, DAffine3)> =
+            self.roots()?.into_iter().rev().map(|node| (node, DAffine3::IDENTITY)).collect();
+        let mut seen = vec![false; root.nodes.len()];
+        while let Some((n, parent)) = stack.pop() {
+            let node = root.nodes.get(n).ok_or_else(|| self.error(format!("node {n} does not exist")))?;
+            let what = match &node.name {
+                Some(name) => format!("node {n} \"{name}\""),
+                None => format!("node {n}"),
+            };
+            if std::mem::replace(&mut seen[n], true) {
+                return Err(self.error(format!("{what} is reached twice; nodes must form trees")));
+            }
+            let transform = parent * self.local_transform(node, &what)?;
+            if !transform.is_finite() || !transform.as_affine3a().is_finite() {
+                return Err(self.error(format!("{what}: its place in the world is too large for a float")));
+            }
+            // Last in, first out: reversed, children come in the document's order.
+            stack.extend(node.children.iter().rev().map(|&child| (child, transform)));
+
+            if let Some(mesh) = node.mesh {
+                let primitives = (meshes.get(mesh))
+                    .ok_or_else(|| self.error(format!("{what}: mesh {mesh} does not exist")))?
+                    .clone();
+                if node.skin.is_some() {
+                    self.warn(format!("{what} is skinned; it is shown in its rest pose"));
+                }
+                for local in self.instances(node, &what)? {
+                    self.place(primitives.clone(), transform * local, &what)?;
+                }
+            }
+            if let Some(light) = &node.extensions.light {
+                self.light(light.light, transform, &what)?;
+            }
+            if let Some(camera) = node.camera {
+                self.camera(camera, transform, &what)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The default scene's root nodes; without scenes, the nodes that are nobody's children.
+    fn roots(&mut self) -> Result<Vec<usize>, Error> {
+        let root = self.root;
+        if root.scenes.is_empty() {
+            let mut is_child = vec![false; root.nodes.len()];
+            for &child in root.nodes.iter().flat_map(|node| &node.children) {
+                if let Some(flag) = is_child.get_mut(child) {
+                    *flag = true;
+                }
+            }
+            return Ok((0..root.nodes.len()).filter(|&n| !is_child[n]).collect());
+        }
+        let index = root.scene.unwrap_or(0);
+        let scene =
+            root.scenes.get(index).ok_or_else(|| self.error(format!("scene {index} does not exist")))?;
+        if root.scenes.len() > 1 {
+            self.warn(format!("the document has {} scenes; number {index} is read", root.scenes.len()));
+        }
+        Ok(scene.nodes.clone())
+    }
+
+    fn local_transform(&self, node: &json::Node, what: &str) -> Result<DAffine3, Error> {
+        if let Some(matrix) = &node.matrix {
+            let matrix = DMat4::from_cols_array(matrix);
+            if matrix.row(3) != DVec4::W {
+                return Err(self.error(format!("{what}: the last row of its matrix is not 0 0 0 1")));
+            }
+            return Ok(DAffine3::from_mat4(matrix));
+        }
+        let rotation = DQuat::from_array(node.rotation);
+        if rotation.length_squared() == 0.0 {
+            return Err(self.error(format!("{what}: its rotation is the quaternion 0 0 0 0")));
+        }
+        Ok(DAffine3::from_scale_rotation_translation(
+            DVec3::from(node.scale),
+            rotation.normalize(),
+            DVec3::from(node.translation),
+        ))
+    }
+
+    /// The places of a node's mesh in the node's space: one, or those of `EXT_mesh_gpu_instancing`.
+    fn instances(&mut self, node: &json::Node, what: &str) -> Result<Vec<DAffine3>, Error> {
+        let Some(instancing) = &node.extensions.instancing else { return Ok(vec![DAffine3::IDENTITY]) };
+        let attributes = &instancing.attributes;
+        let what = format!("{what}: EXT_mesh_gpu_instancing");
+        let translations = match attributes.translation {
+            Some(accessor) => Some(self.accessors.floats::<3>(accessor, &format!("{what}: TRANSLATION"))?),
+            None => None,
+        };
+        let rotations = match attributes.rotation {
+            Some(accessor) => Some(self.accessors.floats::<4>(accessor, &format!("{what}: ROTATION"))?),
+            None => None,
+        };
+        let scales = match attributes.scale {
+            Some(accessor) => Some(self.accessors.floats::<3>(accessor, &format!("{what}: SCALE"))?),
+            None => None,
+        };
+        let counts: Vec<usize> = [
+            translations.as_ref().map(Vec::len),
+            rotations.as_ref().map(Vec::len),
+            scales.as_ref().map(Vec::len),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        let count = counts.first().copied().unwrap_or(0);
+        if counts.iter().any(|&other| other != count) {
+            return Err(
+                self.error(format!("{what}: its attributes have {counts:?} elements; they must be as many"))
+            );
+        }
+        (0..count)
+            .map(|i| {
+                let rotation =
+                    rotations.as_ref().map_or(DQuat::IDENTITY, |all| Quat::from_array(all[i]).as_dquat());
+                if rotation.length_squared() == 0.0 {
+                    return Err(self.error(format!("{what}: the rotation of instance {i} is 0 0 0 0")));
+                }
+                Ok(DAffine3::from_scale_rotation_translation(
+                    scales.as_ref().map_or(DVec3::ONE, |all| Vec3::from(all[i]).as_dvec3()),
+                    rotation.normalize(),
+                    translations.as_ref().map_or(DVec3::ZERO, |all| Vec3::from(all[i]).as_dvec3()),
+                ))
+            })
+            .collect()
+    }
+
+    fn place(
+        &mut self,
+        primitives: std::ops::Range<usize>,
+        transform: DAffine3,
+        what: &str,
+    ) -> Result<(), Error> {
+        let transform = transform.as_affine3a();
+        if !transform.is_finite() || !transform.inverse().is_finite() {
+            self.warn(format!("{what} is scaled to nothing along an axis; its mesh was left out"));
+            return Ok(());
+        }
+        if self.scene.instances.len() + primitives.len() > INSTANCES_MAX {
+            return Err(self.error(format!("{what}: the scene has more than {INSTANCES_MAX} instances")));
+        }
+        self.scene.instances.extend(primitives.map(|primitive| Instance { primitive, transform }));
+        Ok(())
+    }
+
+    /// `KHR_lights_punctual`: a light shines along its node's -z, and scale does not matter to it.
+    fn light(&mut self, index: usize, transform: DAffine3, what: &str) -> Result<(), Error> {
+        let root = self.root;
+        let light = (root.extensions.lights.as_ref())
+            .and_then(|extension| extension.lights.get(index))
+            .ok_or_else(|| self.error(format!("{what}: light {index} does not exist")))?;
+        let what = format!("light {index}");
+        let kind = match light.kind.as_str() {
+            "directional" => LightKind::Directional,
+            "point" => LightKind::Point,
+            "spot" => {
+                let json::Spot { inner_cone_angle, outer_cone_angle } = light.spot;
+                // The negation also catches NaN.
+                if !(0.0 <= inner_cone_angle
+                    && inner_cone_angle < outer_cone_angle
+                    && outer_cone_angle <= std::f32::consts::FRAC_PI_2)
+                {
+                    return Err(self.error(format!(
+                        "{what}: its cone angles are {inner_cone_angle} and {outer_cone_angle}; \
+                         0 <= inner < outer <= pi/2 is required"
+                    )));
+                }
+                LightKind::Spot { inner_cone_angle, outer_cone_angle }
+            }
+            other => {
+                return Err(
+                    self.error(format!("{what}: type \"{other}\"; directional, point or spot are allowed"))
+                );
+            }
+        };
+        let color = Vec3::from(self.finite(light.color, &format!("{what}: color"))?)
+            * self.finite([light.intensity], &format!("{what}: intensity"))?[0];
+        self.finite(color.to_array(), &format!("{what}: color times intensity"))?;
+        if light.range.is_some_and(|range| range.is_nan() || range <= 0.0) {
+            return Err(self.error(format!("{what}: its range is {:?}; it must be positive", light.range)));
+        }
+        let Some(direction) = (-transform.matrix3.z_axis).try_normalize() else {
+            self.warn(format!("{what} stands in a node that is scaled to nothing; it was left out"));
+            return Ok(());
+        };
+        self.scene.lights.push(Light {
+            kind,
+            color,
+            position: transform.translation.as_vec3(),
+            direction: direction.as_vec3(),
+            range: light.range.unwrap_or(f32::INFINITY),
+        });
+        Ok(())
+    }
+
+    fn camera(&mut self, index: usize, transform: DAffine3, what: &str) -> Result<(), Error> {
+        let root = self.root;
+        let camera = (root.cameras.get(index))
+            .ok_or_else(|| self.error(format!("{what}: camera {index} does not exist")))?;
+        let what = match &camera.name {
+            Some(name) => format!("camera {index} \"{name}\""),
+            None => format!("camera {index}"),
+        };
+        let Some(perspective) = &camera.perspective else {
+            self.warn(format!("{what} is orthographic; it was left out"));
+            return Ok(());
+        };
+        let yfov = perspective.yfov;
+        if !(0.0 < yfov && yfov < std::f32::consts::PI) {
+            return Err(self.error(format!("{what}: its yfov is {yfov}; it must lie between 0 and pi")));
+        }
+        let z = transform.matrix3.z_axis.try_normalize();
+        let x = z.and_then(|z| transform.matrix3.y_axis.cross(z).try_normalize());
+        let (Some(x), Some(z)) = (x, z) else {
+            self.warn(format!("{what} stands in a node that is scaled to nothing; it was left out"));
+            return Ok(());
+        };
+        let rigid =
+            DAffine3::from_mat3_translation(DMat3::from_cols(x, z.cross(x), z), transform.translation);
+        self.scene.cameras.push(Camera { transform: rigid.as_affine3a(), yfov });
+        Ok(())
+    }
+
+    /// Decodes the images that materials use.
+    fn images(&mut self, resolve: &Resolver<'_>) -> Result<(), Error> {
+        let mut used = vec![false; self.root.images.len()];
+        for texture in self.scene.materials.iter().flat_map(Material::textures) {
+            used[texture.image] = true;
+        }
+        let texels = AtomicU64::new(0);
+        let images: Result<Vec<_>, Error> = (used.into_par_iter().enumerate())
+            .map(
+                |(i, used)| {
+                    if used { self.image(i, &texels, resolve).map(|i| Some(Arc::new(i))) } else { Ok(None) }
+                },
+            )
+            .collect();
+        self.scene.images = images?;
+        Ok(())
+    }
+
+    fn image(&self, index: usize, texels: &AtomicU64, resolve: &Resolver<'_>) -> Result<Image, Error> {
+        let what = format!("image {index}");
+        let image = &self.root.images[index];
+        let fetched;
+        let (name, bytes) = match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => {
+                fetched = fetch(self.name, &what, uri, resolve)?;
+                let name = if uri.starts_with("data:") { what } else { format!("{what} \"{uri}\"") };
+                (name, fetched.as_slice())
+            }
+            (None, Some(view)) => (what.clone(), self.accessors.view(view, &what)?),
+            (None, None) => return Err(self.error(format!("{what} has neither uri nor bufferView"))),
+        };
+        let name = PathBuf::from(format!("{}: {name}", self.name.display()));
+        let decoded = match bytes {
+            [b'D', b'D', b'S', b' ', ..] | [0xab, b'K', b'T', b'X', ..] => {
+                level_zero(&kinran_image::decode_texture(&name, bytes)?)?
+            }
+            _ => kinran_image::decode_image(&name, bytes)?,
+        };
+        let size = u64::from(decoded.width) * u64::from(decoded.height);
+        if texels.fetch_add(size, Ordering::Relaxed) + size > TEXELS_MAX {
+            return Err(Error::unsupported(
+                self.name,
+                format!("its images have more than {TEXELS_MAX} texels together; scale them down"),
+            ));
+        }
+        Ok(decoded)
+    }
+}
+
+/// The largest level of an engine texture as an image: 8 bits for the formats that decode to them, else
+/// floats. BC5 holds normals, the only thing in glTF that has two channels, and gets its z back.
+fn level_zero(texture: &Texture) -> Result<Image, Error> {
+    let Some(level) = texture.levels.first() else {
+        return Err(kinran_image::Error::Unsupported("a texture has no level".into()).into());
+    };
+    let texels = texture.decode_level(0)?;
+    let (channels, pixels) = match texture.format {
+        Format::Bc1 | Format::Bc7 | Format::Rgba8 => {
+            // Exact: these decode to multiples of 1/255.
+            let bytes = texels.as_flattened().iter().map(|&x| (x * 255.0 + 0.5) as u8);
+            (Channels::Rgba, Pixels::U8(bytes.collect()))
+        }
+        Format::Bc4 => (Channels::R, Pixels::F32(texels.iter().map(|texel| texel[0]).collect())),
+        Format::Bc5 => {
+            let normals = texels.iter().flat_map(|&[r, g, ..]| {
+                let (x, y) = (2.0 * r - 1.0, 2.0 * g - 1.0);
+                [r, g, 0.5 + 0.5 * (1.0 - x * x - y * y).max(0.0).sqrt()]
+            });
+            (Channels::Rgb, Pixels::F32(normals.collect()))
+        }
+        Format::Rgba16F => (Channels::Rgba, Pixels::F32(texels.as_flattened().to_vec())),
+    };
+    Ok(Image::new(level.width, level.height, channels, pixels)?)
+}
+
+/// The matrix of `KHR_texture_transform`, translation times rotation times scale.
+///
+/// The rotation is the one that the extension's text and its examples mean and that viewers implement,
+/// counter-clockwise as seen with v downwards: `u' = u cos + v sin`, `v' = v cos - u sin`.
+fn texture_transform(extension: &json::TextureTransform) -> Mat3 {
+    let (sin, cos) = libm::sincosf(extension.rotation);
+    let [x, y] = extension.scale;
+    Mat3::from_cols(
+        Vec3::new(cos * x, -sin * x, 0.0),
+        Vec3::new(sin * y, cos * y, 0.0),
+        Vec2::from(extension.offset).extend(1.0),
+    )
+}

@@ -1,0 +1,194 @@
+use std::sync::Arc;
+
+use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
+
+/// How a texture repeats outside the unit square.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Wrap {
+    /// Tiles.
+    Repeat,
+    /// Continues its border texel.
+    Clamp,
+    /// Tiles, every other tile mirrored.
+    Mirror,
+}
+
+/// One use of a texture by a material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureRef {
+    /// Index into [`Scene::images`].
+    pub image: usize,
+    /// Which of a primitive's UV sets: 0 or 1.
+    pub uv_set: usize,
+    /// Maps the primitive's UV to the texture's (`KHR_texture_transform`; identity when absent).
+    pub transform: Mat3,
+    /// Repetition along u and v.
+    pub wrap: [Wrap; 2],
+}
+
+/// `KHR_materials_anisotropy`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Anisotropy {
+    /// 0 to 1, multiplied with the texture's blue channel.
+    pub strength: f32,
+    /// Radians, counter-clockwise from the tangent, added to the texture's direction.
+    pub rotation: f32,
+    /// RG direction in tangent space mapped from [0, 1] to [-1, 1], B strength.
+    pub texture: Option<TextureRef>,
+}
+
+/// What happens where a surface's alpha is below one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    Opaque,
+    /// Alpha below the cutoff is a hole.
+    Mask {
+        /// The cutoff, 0 to 1.
+        cutoff: f32,
+    },
+    /// Alpha blends with what lies behind.
+    Blend,
+}
+
+/// A glTF metallic-roughness material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// The document's name, or `material N`.
+    pub name: String,
+    /// Linear, multiplied with the texture.
+    pub base_color_factor: Vec4,
+    /// sRGB colour, linear alpha.
+    pub base_color: Option<TextureRef>,
+    /// 0 to 1, multiplied with the texture's blue channel.
+    pub metallic_factor: f32,
+    /// Perceptual roughness, 0 to 1, multiplied with the texture's green channel.
+    pub roughness_factor: f32,
+    /// G roughness, B metallic.
+    pub metallic_roughness: Option<TextureRef>,
+    /// Tangent space, +Y up.
+    pub normal: Option<TextureRef>,
+    /// Scales the normal map's x and y.
+    pub normal_scale: f32,
+    /// R occlusion.
+    pub occlusion: Option<TextureRef>,
+    /// 0 to 1.
+    pub occlusion_strength: f32,
+    /// Linear radiance, `emissiveFactor` times `KHR_materials_emissive_strength`.
+    pub emissive_factor: Vec3,
+    /// sRGB colour.
+    pub emissive: Option<TextureRef>,
+    /// `KHR_materials_anisotropy`, when present.
+    pub anisotropy: Option<Anisotropy>,
+    /// Transparency.
+    pub alpha_mode: AlphaMode,
+    /// Both sides are lit; otherwise back faces are culled.
+    pub double_sided: bool,
+    /// Names of extensions on this material that [`Material`] does not represent.
+    pub ignored_extensions: Vec<String>,
+}
+
+impl Material {
+    /// Every texture of the material; the normal map first, then the anisotropy map, for the first one
+    /// tells which UV set generated tangents follow.
+    pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
+        [
+            self.normal.as_ref(),
+            self.anisotropy.as_ref().and_then(|anisotropy| anisotropy.texture.as_ref()),
+            self.base_color.as_ref(),
+            self.metallic_roughness.as_ref(),
+            self.occlusion.as_ref(),
+            self.emissive.as_ref(),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
+/// Triangles of one material. All vertex arrays have the same length.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Primitive {
+    /// Metres.
+    pub positions: Vec<Vec3>,
+    /// Unit length.
+    pub normals: Vec<Vec3>,
+    /// `TANGENT`, or MikkTSpace's: xyz unit length, w the bitangent's sign, `b = w * cross(n, t)`.
+    pub tangents: Vec<Vec4>,
+    /// `TEXCOORD_0` and `TEXCOORD_1`; empty when absent, which means (0, 0) everywhere.
+    pub uvs: [Vec<Vec2>; 2],
+    /// Linear RGBA; empty when absent.
+    pub colors: Vec<Vec4>,
+    /// Vertex indices of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+}
+
+/// A primitive placed in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instance {
+    /// Index into [`Scene::primitives`].
+    pub primitive: usize,
+    /// Object to world; invertible. Where its determinant is negative, triangles turn clockwise in the world.
+    pub transform: Affine3A,
+}
+
+/// The shape of a [`Light`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// Parallel light; intensity in lux.
+    Directional,
+    /// From a point; intensity in candela.
+    Point,
+    /// A cone; intensity in candela.
+    Spot {
+        /// Radians from the axis within which the light is full.
+        inner_cone_angle: f32,
+        /// Radians from the axis beyond which there is none.
+        outer_cone_angle: f32,
+    },
+}
+
+/// A punctual light (`KHR_lights_punctual`) in world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Shape.
+    pub kind: LightKind,
+    /// Linear colour times intensity.
+    pub color: Vec3,
+    /// World position; meaningless for [`LightKind::Directional`].
+    pub position: Vec3,
+    /// The unit direction in which the light shines.
+    pub direction: Vec3,
+    /// Metres beyond which there is no light; infinite when unlimited.
+    pub range: f32,
+}
+
+/// A perspective camera in world space, looking along its -z with +y up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Camera to world, a rigid transform.
+    pub transform: Affine3A,
+    /// Vertical field of view in radians.
+    pub yfov: f32,
+}
+
+/// A glTF scene, flattened and validated.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Geometry in object space.
+    pub primitives: Vec<Primitive>,
+    /// Where the geometry stands.
+    pub instances: Vec<Instance>,
+    /// Materials; a document without any gets glTF's default one.
+    pub materials: Vec<Material>,
+    /// Decoded images, in the document's order; `None` where no material uses the image, or where an
+    /// earlier image has the same source and stands for it.
+    pub images: Vec<Option<Arc<kinran_image::Image>>>,
+    /// Lights.
+    pub lights: Vec<Light>,
+    /// Cameras.
+    pub cameras: Vec<Camera>,
+    /// What was left out or mended on the way in, a sentence each.
+    pub warnings: Vec<String>,
+}

@@ -1,0 +1,455 @@
+//! Small documents that probe one thing each.
+
+use std::path::Path;
+
+use glam::{Vec2, Vec3, Vec4};
+use kinran_scene::{AlphaMode, Error, LightKind, Scene, Wrap};
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+/// A GLB with every kind of thing in it: indexed and plain triangles, sparse and normalised accessors, a
+/// texture, a hierarchy, lights, a camera, instancing.
+fn everything() -> (Value, Vec<u8>) {
+    let mut bin = Vec::new();
+    let mut view = |bytes: &[u8]| {
+        bin.resize(bin.len().next_multiple_of(4), 0);
+        bin.extend_from_slice(bytes);
+        json!({ "buffer": 0, "byteOffset": bin.len() - bytes.len(), "byteLength": bytes.len() })
+    };
+    let floats = |values: &[f32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+    let image = kinran_image::Image {
+        width: 2,
+        height: 2,
+        channels: kinran_image::Channels::Rgb,
+        pixels: kinran_image::Pixels::U8((0..12).collect()),
+    };
+    let mut views = vec![
+        // A unit square in the plane z = 0.
+        view(&floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.])),
+        view(&[0, 1, 2, 0, 2, 3]),
+        view(&[0u16, 0, 65535, 0, 65535, 65535, 0, 65535].map(u16::to_le_bytes).concat()),
+        view(&[3]),
+        view(&floats(&[0., 2., 0.])),
+        view(&floats(&[5., 0., 0., 0., 6., 0.])),
+        view(&kinran_image::encode_png(&image).unwrap()),
+        view(&[0, 0, 127, 99].repeat(4)),
+    ];
+    views[7]["byteStride"] = json!(4);
+    let json = json!({
+        "asset": { "version": "2.0" },
+        "extensionsUsed": ["KHR_lights_punctual", "KHR_texture_transform", "KHR_materials_anisotropy", "EXT_mesh_gpu_instancing"],
+        "extensionsRequired": ["KHR_texture_transform"],
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [
+            { "scale": [2, 2, 2], "children": [1, 2, 3] },
+            { "name": "square", "mesh": 0, "translation": [1, 0, 0] },
+            { "camera": 0, "translation": [0, 0, 4], "extensions": { "KHR_lights_punctual": { "light": 0 } } },
+            { "mesh": 0, "extensions": { "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": 4 } } } },
+        ],
+        "cameras": [{ "type": "perspective", "perspective": { "yfov": 0.5, "znear": 0.1 } }],
+        "extensions": { "KHR_lights_punctual": { "lights": [
+            { "type": "spot", "color": [1, 0.5, 0], "intensity": 4, "range": 9, "spot": { "innerConeAngle": 0.1 }, "extras": 1 },
+        ] } },
+        "meshes": [{ "name": "quad", "primitives": [
+            { "attributes": { "POSITION": 0, "NORMAL": 5, "TEXCOORD_0": 2 }, "indices": 1, "material": 0 },
+            { "attributes": { "POSITION": 3 }, "mode": 5 },
+        ] }],
+        "materials": [{
+            "name": "brushed",
+            "normalTexture": { "index": 0, "scale": 0.5, "extensions": { "KHR_texture_transform": { "offset": [0, 1], "rotation": std::f32::consts::FRAC_PI_2, "scale": [0.5, 0.5] } } },
+            "alphaMode": "MASK",
+            "emissiveFactor": [0.5, 0, 0],
+            "extensions": {
+                "KHR_materials_anisotropy": { "anisotropyStrength": 0.6, "anisotropyRotation": 1.57, "anisotropyTexture": { "index": 0 } },
+                "KHR_materials_emissive_strength": { "emissiveStrength": 4 },
+                "KHR_materials_sheen": {},
+            },
+        }],
+        "textures": [{ "source": 0, "sampler": 0 }],
+        "samplers": [{ "wrapS": 33071, "wrapT": 33648 }],
+        "images": [{ "bufferView": 6, "mimeType": "image/png" }],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3" },
+            { "bufferView": 1, "componentType": 5121, "count": 6, "type": "SCALAR" },
+            { "bufferView": 2, "componentType": 5123, "normalized": true, "count": 4, "type": "VEC2" },
+            { "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+              "sparse": { "count": 1, "indices": { "bufferView": 3, "componentType": 5121 }, "values": { "bufferView": 4 } } },
+            { "bufferView": 5, "componentType": 5126, "count": 2, "type": "VEC3" },
+            { "bufferView": 7, "componentType": 5120, "normalized": true, "count": 4, "type": "VEC3" },
+        ],
+        "bufferViews": views,
+        "buffers": [{ "byteLength": bin.len() }],
+    });
+    (json, bin)
+}
+
+fn glb(json: &Value, bin: &[u8]) -> Vec<u8> {
+    let mut json = serde_json::to_vec(json).unwrap();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut out = b"glTF".to_vec();
+    for n in [2, (28 + json.len() + bin.len().next_multiple_of(4)) as u32, json.len() as u32] {
+        out.extend(n.to_le_bytes());
+    }
+    out.extend(b"JSON");
+    out.extend(json);
+    out.extend((bin.len().next_multiple_of(4) as u32).to_le_bytes());
+    out.extend(b"BIN\0");
+    out.extend(bin);
+    out.resize(out.len().next_multiple_of(4), 0);
+    out
+}
+
+fn load(bytes: &[u8]) -> Result<Scene, Error> {
+    Scene::from_bytes(Path::new("test.glb"), bytes, &|path| {
+        Err(std::io::Error::other(format!("no {path} here")))
+    })
+}
+
+fn assert_near(what: &str, want: Vec3, got: Vec3) {
+    assert!((want - got).length() < 1e-5, "{what}: wanted {want}, got {got}");
+}
+
+#[test]
+fn everything_arrives_where_it_belongs() {
+    let (json, bin) = everything();
+    let scene = load(&glb(&json, &bin)).unwrap();
+    let [square, strip] = &scene.primitives[..] else { panic!("{} primitives", scene.primitives.len()) };
+
+    // The strip has no material of its own, no UVs and no normals; its last vertex is replaced.
+    assert_eq!((square.material, strip.material), (0, 1));
+    assert_eq!(scene.materials[1].name, "default");
+    assert_eq!(strip.triangles.len(), 2);
+    assert_eq!(strip.positions.len(), 6, "flat normals need a vertex for each corner");
+    assert!(strip.positions.contains(&Vec3::new(0., 2., 0.)), "{:?}", strip.positions);
+    assert!(!strip.positions.contains(&Vec3::Y), "{:?}", strip.positions);
+    assert_near("normal of the first triangle of the strip", Vec3::Z, strip.normals[0]);
+    assert_near("strips alternate their winding", Vec3::NEG_Z, strip.normals[3]);
+
+    // v runs downwards in glTF, and in this square upwards in space: the bitangent is -y.
+    assert_eq!(square.triangles.len(), 2);
+    assert_eq!(square.positions.len(), 4, "corners that agree stay one vertex");
+    for (i, position) in square.positions.iter().enumerate() {
+        assert_eq!(square.uvs[0][i], Vec2::new(position.x, position.y));
+        assert_near("normal", Vec3::Z, square.normals[i]);
+        let tangent: Vec4 = square.tangents[i];
+        assert_near("tangent", Vec3::X, tangent.truncate());
+        assert_near("bitangent", Vec3::NEG_Y, square.normals[i].cross(tangent.truncate()) * tangent.w);
+    }
+
+    let places: Vec<Vec3> = scene.instances.iter().map(|i| i.transform.transform_point3(Vec3::X)).collect();
+    let want = [[4., 0., 0.], [4., 0., 0.], [12., 0., 0.], [12., 0., 0.], [2., 12., 0.], [2., 12., 0.]];
+    assert_eq!(places, want.map(Vec3::from));
+    assert_eq!(scene.triangle_count(), 12);
+    let [min, max] = scene.bounds().unwrap();
+    assert_eq!((min, max), (Vec3::ZERO, Vec3::new(12., 16., 0.)));
+
+    let camera = &scene.cameras[0];
+    assert_near("the camera", Vec3::new(0., 0., 8.), camera.transform.translation.into());
+    assert_near("the camera has no scale", Vec3::Z, camera.transform.matrix3.z_axis.into());
+    let light = &scene.lights[0];
+    assert_near("light", Vec3::NEG_Z, light.direction);
+    assert_eq!((light.color, light.range), (Vec3::new(4., 2., 0.), 9.));
+    assert!(matches!(light.kind, LightKind::Spot { inner_cone_angle: 0.1, .. }), "{:?}", light.kind);
+
+    let material = &scene.materials[0];
+    let normal = material.normal.as_ref().unwrap();
+    assert_eq!(material.normal_scale, 0.5);
+    assert_eq!(normal.wrap, [Wrap::Clamp, Wrap::Mirror]);
+    assert_eq!(material.alpha_mode, AlphaMode::Mask { cutoff: 0.5 });
+    assert_eq!(material.emissive_factor, Vec3::new(2., 0., 0.));
+    assert_eq!(material.ignored_extensions, ["KHR_materials_sheen"]);
+    let anisotropy = material.anisotropy.as_ref().unwrap();
+    assert_eq!((anisotropy.strength, anisotropy.rotation), (0.6, 1.57));
+    assert!(anisotropy.texture.is_some());
+    let image = scene.images[0].as_ref().unwrap();
+    assert_eq!(image.pixels, kinran_image::Pixels::U8((0..12).collect()));
+
+    // The extension's own example: this transform takes the lower left quarter of the image.
+    let [min, max] = [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE]
+        .map(|uv| (normal.transform * uv.extend(1.0)).truncate())
+        .iter()
+        .fold([Vec2::MAX, Vec2::MIN], |[min, max], &uv| [min.min(uv), max.max(uv)]);
+    assert!(
+        min.distance(Vec2::new(0., 0.5)) < 1e-6 && max.distance(Vec2::new(0.5, 1.)) < 1e-6,
+        "{min} {max}"
+    );
+    assert_eq!(scene.warnings, Vec::<String>::new());
+}
+
+/// Textures without PNG or JPEG, as a baker for one engine writes them.
+#[test]
+fn engine_textures_stand_in_for_missing_images() {
+    use kinran_image::{Channels, Format, Level, Pixels, Texture, Transfer, encode_dds, encode_ktx2};
+    for (format, channels) in
+        [(Format::Bc7, Channels::Rgba), (Format::Bc5, Channels::Rgb), (Format::Bc4, Channels::R)]
+    {
+        let level = Level { width: 4, height: 4, data: vec![0; format.level_bytes(4, 4)] };
+        let texture =
+            Texture { format, transfer: Transfer::Linear, levels: vec![level], metadata: Default::default() };
+        for (extension, bytes) in [
+            ("KHR_texture_basisu", encode_ktx2(&texture, None).unwrap()),
+            ("MSFT_texture_dds", encode_dds(&texture).unwrap()),
+        ] {
+            let (mut json, mut bin) = everything();
+            bin.resize(bin.len().next_multiple_of(4), 0);
+            json["bufferViews"][6] =
+                json!({ "buffer": 0, "byteOffset": bin.len(), "byteLength": bytes.len() });
+            bin.extend(bytes);
+            json["buffers"][0]["byteLength"] = json!(bin.len());
+            json["textures"][0] = json!({ "extensions": { extension: { "source": 0 } } });
+            json["extensionsRequired"] = json!([extension]);
+            let scene =
+                load(&glb(&json, &bin)).unwrap_or_else(|error| panic!("{extension} {format:?}: {error}"));
+            let image = scene.images[0].as_ref().unwrap();
+            assert_eq!(
+                (image.width, image.height, image.channels),
+                (4, 4, channels),
+                "{extension} {format:?}"
+            );
+            let floats = matches!(image.pixels, Pixels::F32(_));
+            assert_eq!(floats, format != Format::Bc7, "{extension} {format:?}");
+            if let (Format::Bc5, Pixels::F32(samples)) = (format, &image.pixels) {
+                // Blocks of zeros are x = y = -1, outside the unit disc: no z is left.
+                assert_eq!(samples[..3], [0.0, 0.0, 0.5], "{extension}");
+            }
+        }
+    }
+}
+
+/// Each of these must be refused by one sentence that holds all the given words.
+#[test]
+fn hostile_documents_are_refused_by_name() {
+    let huge = u64::MAX;
+    let cases: Vec<(&str, Value, &[&str])> = vec![
+        ("/asset/version", json!("1.0"), &["test.glb", "glTF version", "2.0"]),
+        (
+            "/extensionsRequired/0",
+            json!("KHR_draco_mesh_compression"),
+            &["KHR_draco_mesh_compression", "decompress"],
+        ),
+        ("/extensionsRequired/0", json!("ACME_holes"), &["ACME_holes"]),
+        ("/buffers/0/byteLength", json!(100_000), &["buffer 0", "100000", "truncated"]),
+        ("/buffers/0/byteLength", json!(huge), &["buffer 0", "truncated"]),
+        ("/buffers/0/uri", json!("http://example.org/a.bin"), &["buffer 0", "not relative"]),
+        ("/buffers/0/uri", json!("/etc/passwd"), &["buffer 0", "relative"]),
+        ("/buffers/0/uri", json!("gone.bin"), &["buffer 0", "gone.bin", "cannot be read"]),
+        ("/buffers/0/uri", json!("data:;base64,!!"), &["buffer 0", "base64"]),
+        ("/bufferViews/0/byteLength", json!(huge), &["POSITION", "bufferView 0"]),
+        ("/bufferViews/0/byteOffset", json!(huge), &["POSITION", "bufferView 0"]),
+        ("/bufferViews/0/buffer", json!(7), &["buffer 7 does not exist"]),
+        ("/bufferViews/0/byteStride", json!(1), &["byteStride 1"]),
+        ("/bufferViews/0/byteStride", json!(huge), &["POSITION", "bufferView 0"]),
+        ("/accessors/0/count", json!(1_000_000_000), &["POSITION", "1000000000"]),
+        ("/accessors/1/count", json!(1_000_000_000), &["indices", "1000000000"]),
+        ("/accessors/0/count", json!(huge), &["POSITION"]),
+        ("/accessors/0/byteOffset", json!(huge), &["POSITION"]),
+        ("/accessors/0/bufferView", json!(99), &["bufferView 99 does not exist"]),
+        ("/accessors/0/componentType", json!(5130), &["componentType 5130"]),
+        ("/accessors/0/type", json!("MAT4"), &["MAT4"]),
+        ("/accessors/2/count", json!(3), &["TEXCOORD_0 has 3 elements", "POSITION 4"]),
+        ("/accessors/3/sparse/count", json!(5), &["replaces 5"]),
+        ("/accessors/1/componentType", json!(5126), &["indices of componentType 5126"]),
+        (
+            "/meshes/0/primitives/0/attributes/POSITION",
+            json!(99),
+            &["mesh 0 \"quad\", primitive 0", "accessor 99"],
+        ),
+        ("/meshes/0/primitives/0/indices", json!(99), &["accessor 99 does not exist"]),
+        ("/meshes/0/primitives/0/material", json!(99), &["material 99 does not exist"]),
+        ("/meshes/0/primitives/0/mode", json!(9), &["mode 9"]),
+        ("/nodes/1/mesh", json!(99), &["node 1 \"square\"", "mesh 99"]),
+        ("/nodes/0/children/0", json!(0), &["node 0", "reached twice"]),
+        ("/nodes/0/children/0", json!(99), &["node 99 does not exist"]),
+        ("/nodes/0/scale/0", json!(1e300), &["node", "too large"]),
+        ("/nodes/1/rotation", json!([0, 0, 0, 0]), &["node 1", "rotation"]),
+        ("/nodes/2/camera", json!(5), &["camera 5"]),
+        ("/nodes/2/extensions/KHR_lights_punctual/light", json!(5), &["light 5"]),
+        ("/cameras/0/perspective/yfov", json!(-1), &["camera 0", "yfov"]),
+        ("/extensions/KHR_lights_punctual/lights/0/color/0", json!(3e38), &["light 0", "intensity"]),
+        ("/materials/0/normalTexture/index", json!(9), &["material 0 \"brushed\"", "texture 9"]),
+        ("/materials/0/emissiveFactor/0", json!(3e38), &["material 0", "emissiveFactor"]),
+        ("/textures/0/source", json!(9), &["image 9"]),
+        ("/textures/0/sampler", json!(9), &["sampler 9"]),
+        ("/samplers/0/wrapS", json!(1), &["wrap mode 1"]),
+        ("/images/0/bufferView", json!(0), &["image 0"]),
+        ("/scene", json!(3), &["scene 3"]),
+        ("/materials/0/alphaCutoff", json!(1e200), &["JSON", "out of range"]),
+        ("/accessors", json!("many"), &["JSON"]),
+    ];
+    for (pointer, value, words) in cases {
+        let (mut json, bin) = everything();
+        let (parent, key) = pointer.rsplit_once('/').unwrap();
+        match json.pointer_mut(parent).unwrap() {
+            Value::Object(object) => drop(object.insert(key.into(), value.clone())),
+            Value::Array(array) => array[key.parse::<usize>().unwrap()] = value.clone(),
+            other => panic!("{pointer}: {other}"),
+        }
+        let error = match load(&glb(&json, &bin)) {
+            Ok(_) => panic!("{pointer} = {value} was accepted"),
+            Err(error) => error.to_string(),
+        };
+        for word in words {
+            assert!(error.contains(word), "{pointer} = {value}: no {word:?} in {error:?}");
+        }
+        assert!(error.contains("test.glb"), "{pointer} = {value}: no file name in {error:?}");
+    }
+}
+
+#[test]
+fn vertices_that_are_not_numbers_and_indices_out_of_range_are_named() {
+    let (json, mut bin) = everything();
+    bin[4..8].copy_from_slice(&f32::NAN.to_le_bytes());
+    let error = load(&glb(&json, &bin)).unwrap_err().to_string();
+    assert!(
+        error.contains("mesh 0 \"quad\", primitive 0: POSITION: element 0") && error.contains("NaN"),
+        "{error}"
+    );
+
+    let (json, mut bin) = everything();
+    let offset = json["bufferViews"][1]["byteOffset"].as_u64().unwrap() as usize;
+    bin[offset + 5] = 200;
+    let error = load(&glb(&json, &bin)).unwrap_err().to_string();
+    assert!(error.contains("index number 5 is 200, and there are 4 vertices"), "{error}");
+}
+
+/// A few kilobytes of JSON that ask for terabytes: by sparse accessors without bytes, and by many
+/// primitives that share theirs.
+#[test]
+fn small_files_cannot_expand_without_bound() {
+    let (mut json, bin) = everything();
+    json["accessors"][0] = json!({ "componentType": 5126, "count": 1_000_000_000_000u64, "type": "VEC3" });
+    let error = load(&glb(&json, &bin)).unwrap_err().to_string();
+    assert!(error.contains("POSITION") && error.contains("more than its bytes can hold"), "{error}");
+
+    let (mut json, bin) = everything();
+    json["accessors"][0] = json!({ "componentType": 5126, "count": 1 << 20, "type": "VEC3" });
+    json["meshes"][0]["primitives"] =
+        vec![json!({ "attributes": { "POSITION": 0, "NORMAL": 0 } }); 4000].into();
+    let error = load(&glb(&json, &bin)).unwrap_err().to_string();
+    assert!(error.contains("by sharing"), "{error}");
+}
+
+#[test]
+fn harmless_flaws_are_mended_with_a_warning() {
+    let cases: [(&str, Value, &str); 7] = [
+        ("/meshes/0/primitives/1/mode", json!(0), "points or lines"),
+        ("/meshes/0/primitives/1/attributes", json!({}), "no POSITION"),
+        ("/accessors/1/count", json!(5), "no multiple of three"),
+        ("/nodes/1/scale", json!([1, 1, 0]), "scaled to nothing"),
+        ("/nodes/1/skin", json!(0), "rest pose"),
+        ("/materials/0/normalTexture/texCoord", json!(1), "no TEXCOORD_1"),
+        ("/materials/0/pbrMetallicRoughness", json!({ "roughnessFactor": 3 }), "clamped"),
+    ];
+    for (pointer, value, word) in cases {
+        let (mut json, bin) = everything();
+        let (parent, key) = pointer.rsplit_once('/').unwrap();
+        json.pointer_mut(parent).unwrap().as_object_mut().unwrap().insert(key.into(), value.clone());
+        let scene = load(&glb(&json, &bin)).unwrap_or_else(|error| panic!("{pointer} = {value}: {error}"));
+        assert!(
+            scene.warnings.iter().any(|warning| warning.contains(word)),
+            "{pointer}: {:?}",
+            scene.warnings
+        );
+    }
+}
+
+#[test]
+fn paths_that_are_no_documents_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = Scene::load(folder.path()).unwrap_err().to_string();
+    assert!(error.contains("is a folder") && error.contains(folder.path().to_str().unwrap()), "{error}");
+    let gone = folder.path().join("gone.glb");
+    assert!(Scene::load(&gone).unwrap_err().to_string().contains("gone.glb"));
+    for (name, content, word) in [
+        ("a.glb", &b"glTF"[..], "cut off"),
+        ("b.png", b"\x89PNG\r\n\x1a\n", "is not glTF"),
+        ("c.gltf", b"", "is not glTF"),
+        ("d.gltf", b"{\"asset\":", "JSON"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        let error = Scene::load(&path).unwrap_err().to_string();
+        assert!(error.contains(word) && error.contains(name), "{name}: {error}");
+    }
+}
+
+/// 100 000 nodes in a row: a recursion would overflow the stack.
+#[test]
+fn deep_hierarchies_do_not_overflow() {
+    let nodes: Vec<Value> =
+        (1..=100_000).map(|child| json!({ "children": [child] })).chain([json!({})]).collect();
+    let json = json!({ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": nodes });
+    assert!(load(&glb(&json, &[])).unwrap().instances.is_empty());
+}
+
+#[test]
+fn truncation_anywhere_is_an_error_not_a_panic() {
+    let (json, bin) = everything();
+    let whole = glb(&json, &bin);
+    for length in 0..whole.len() {
+        assert!(load(&whole[..length]).is_err(), "the first {length} of {} bytes were accepted", whole.len());
+        let path = Path::new("test.glb");
+        assert!(kinran_scene::Document::from_bytes(path, &whole[..length]).is_err(), "{length} bytes");
+    }
+}
+
+/// Reads a damaged document in all ways that there are; whatever comes out, it comes out.
+fn read_all_ways(bytes: &[u8]) {
+    if let Ok(scene) = load(bytes) {
+        let camera = scene.default_camera(1.0);
+        assert_eq!(camera.is_some(), scene.triangle_count() > 0);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    if let Ok(document) = kinran_scene::Document::from_bytes(&folder.path().join("in.glb"), bytes) {
+        let _ = document.write(folder.path().join("out.glb"));
+        let _ = document.write(folder.path().join("out.gltf"));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn damaged_bytes_never_panic(flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8)) {
+        let (json, bin) = everything();
+        let mut bytes = glb(&json, &bin);
+        for (at, value) in flips {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        read_all_ways(&bytes);
+    }
+
+    /// Damage that survives the JSON parser: any number anywhere becomes any other.
+    #[test]
+    fn damaged_numbers_never_panic(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), prop_oneof![
+            Just(json!(0)), Just(json!(1)), Just(json!(u64::MAX)), Just(json!(u32::MAX)), Just(json!(-1)),
+            Just(json!(1e300)), Just(json!(null)), Just(json!("x")), Just(json!([])), (0u64..300).prop_map(|n| json!(n)),
+        ]), 1..4),
+    ) {
+        let (mut json, bin) = everything();
+        for (at, value) in changes {
+            let mut leaves = Vec::new();
+            numbers(&json, String::new(), &mut leaves);
+            let pointer = &leaves[at.index(leaves.len())];
+            *json.pointer_mut(pointer).unwrap() = value;
+        }
+        read_all_ways(&glb(&json, &bin));
+    }
+}
+
+/// Pointers to all numbers.
+fn numbers(value: &Value, pointer: String, out: &mut Vec<String>) {
+    match value {
+        Value::Number(_) => out.push(pointer),
+        Value::Array(values) => {
+            values.iter().enumerate().for_each(|(i, value)| numbers(value, format!("{pointer}/{i}"), out));
+        }
+        Value::Object(object) => {
+            object.iter().for_each(|(key, value)| numbers(value, format!("{pointer}/{key}"), out));
+        }
+        _ => {}
+    }
+}

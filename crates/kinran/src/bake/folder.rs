@@ -1,0 +1,133 @@
+//! A folder of authored maps.
+
+use kinran_bake::aniso::{Sheet, SheetRequest, bake_surface};
+use kinran_bake::folder::{Hints, LoadedMaterial, Role as MapRole, scan};
+use kinran_bake::{bake_plain, pack_channels};
+use kinran_image::{Image, Role, Transfer, full_level_count, level_size};
+
+use super::report::hash_file;
+use super::{Args, Form, Input, Report, SurfaceReport, file_name, file_stem, write_texture};
+use crate::{Console, Error};
+
+/// Bakes every material found in a folder.
+///
+/// # Errors
+/// See [`run`](super::run).
+pub fn bake_folder(args: &Args, console: &Console) -> Result<(), Error> {
+    let hints = Hints {
+        green: args.green(),
+        direction_span: args.direction_span.map(f32::to_radians),
+        maps: args.map.clone(),
+        ignore: args.ignore.clone(),
+        roughness_is_gloss: args.roughness_is_gloss,
+        roughness: args.roughness,
+        anisotropy: args.anisotropy,
+        force_normal: args.force_normal,
+        wrap: args.wrap(),
+    };
+    let folder = scan(&args.input, &hints)?;
+    if args.dry_run {
+        return console.result(&folder, &folder.table());
+    }
+
+    let mut reports = Vec::new();
+    let mut text = folder.table() + "\n";
+    for maps in &folder.materials {
+        let loaded = maps.load()?;
+        for note in &loaded.notes {
+            console.warn(note);
+        }
+        let mut report = Report::new(args);
+        report.warnings.clone_from(&loaded.notes);
+        report.surfaces.push(bake_material(args, console, &loaded)?);
+        report.write(&args.output.join(format!("{}.kinran.json", file_stem(&loaded.name))))?;
+        text += &report.text(&args.output);
+        reports.push(report);
+    }
+    console.result(&reports, &text)
+}
+
+fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> Result<SurfaceReport, Error> {
+    let form = args.form.unwrap_or(Form::Aniso);
+    let name = file_stem(&material.name);
+    let mut report = SurfaceReport {
+        name: material.name.clone(),
+        inputs: inputs(material)?,
+        outputs: vec![],
+        levels: vec![],
+    };
+    let image = |at: Option<(usize, usize)>| at.map(|(i, channel)| (&*material.images[i].image, channel));
+    let (occlusion, metallic) = (image(material.occlusion), image(material.metallic));
+
+    if let Some(maps) = &material.surface {
+        let size = maps.size();
+        // One image that holds occlusion and metalness where glTF wants them is packed as it is.
+        let packed = match (occlusion, metallic) {
+            (None, None) => None,
+            _ => Some(pack_channels([occlusion, None, metallic, None], size, maps.wrap)?),
+        };
+        let mut requests = vec![SheetRequest {
+            sheet: Sheet::Normal,
+            encoding: args.encoding(Role::Normal, args.normal_format),
+            packed_with: None,
+        }];
+        let mut request = |sheet, role, packed_with| {
+            requests.push(SheetRequest {
+                sheet,
+                encoding: args.encoding(role, args.aniso_format),
+                packed_with,
+            });
+        };
+        if form.aniso() {
+            request(Sheet::Aniso, Role::Aniso, None);
+        }
+        if form.khr() || packed.is_some() {
+            request(Sheet::Roughness, Role::Data, packed.as_ref());
+        }
+        if form.khr() {
+            request(Sheet::KhrAnisotropy, Role::Aniso, None);
+        }
+
+        let texels = (0..full_level_count(size.0, size.1))
+            .map(|level| u64::from(level_size(size.0, level)) * u64::from(level_size(size.1, level)))
+            .sum();
+        let stage = console.progress().stage(format!("{} {name}", args.filter.name()), texels);
+        let baked = bake_surface(maps, args.options(), &requests, &|texels| stage.add(texels))?;
+        report.levels = baked.levels;
+        for (request, texture) in requests.iter().zip(baked.textures) {
+            let map = if request.packed_with.is_some() { "orm" } else { request.sheet.name() };
+            report.outputs.extend(write_texture(args, &format!("{name}_{map}"), map, texture)?);
+        }
+    } else if occlusion.is_some() || metallic.is_some() {
+        let size = |image: Option<(&Image, usize)>| image.map_or((1, 1), |(i, _)| (i.width, i.height));
+        let (o, m) = (size(occlusion), size(metallic));
+        let packed =
+            pack_channels([occlusion, None, metallic, None], (o.0.max(m.0), o.1.max(m.1)), args.wrap())?;
+        let encoding = args.encoding(Role::Data, args.aniso_format);
+        let texture = bake_plain(&packed, Transfer::Linear, encoding, args.options().kernel, args.wrap())?;
+        report.outputs.extend(write_texture(args, &format!("{name}_orm"), "orm", texture)?);
+    }
+
+    if let Some(color) = material.images.iter().find(|map| map.role == MapRole::Color) {
+        let encoding = args.encoding(Role::Color, args.color_format);
+        let texture = bake_plain(&color.image, Transfer::Srgb, encoding, args.options().kernel, args.wrap())?;
+        report.outputs.extend(write_texture(args, &format!("{name}_color"), "color", texture)?);
+    }
+    Ok(report)
+}
+
+fn inputs(material: &LoadedMaterial) -> Result<Vec<Input>, Error> {
+    material
+        .images
+        .iter()
+        .map(|map| {
+            Ok(Input {
+                file: file_name(&map.path),
+                role: map.role.name().into(),
+                width: map.image.width,
+                height: map.image.height,
+                blake3: hash_file(&map.path)?,
+            })
+        })
+        .collect()
+}

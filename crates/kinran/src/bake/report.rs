@@ -1,0 +1,150 @@
+//! The sidecar: how textures were made and what was lost.
+
+use std::path::Path;
+
+use kinran_bake::aniso::LevelError;
+use kinran_image::{Format, Texture, Transfer, write_atomically};
+use serde::Serialize;
+
+use crate::Error;
+
+/// A file that went in.
+#[derive(Clone, Debug, Serialize)]
+pub struct Input {
+    /// Its name.
+    pub file: String,
+    /// What it holds.
+    pub role: String,
+    /// Texels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// BLAKE3 of the file's bytes.
+    pub blake3: String,
+}
+
+/// A file that came out.
+#[derive(Clone, Debug, Serialize)]
+pub struct Output {
+    /// Its name, beside the report.
+    pub file: String,
+    /// What it holds.
+    pub map: String,
+    /// Its texel format.
+    pub format: String,
+    /// `linear` or `srgb`.
+    pub transfer: &'static str,
+    /// Texels in a row of level 0.
+    pub width: u32,
+    /// Rows of level 0.
+    pub height: u32,
+    /// Mip levels.
+    pub levels: usize,
+    /// Size of the file.
+    pub bytes: usize,
+    /// BLAKE3 of the file's bytes.
+    pub blake3: String,
+}
+
+impl Output {
+    pub(super) fn new(file: String, map: &str, texture: &Texture, bytes: &[u8]) -> Self {
+        let format = match texture.format {
+            Format::Bc1 => "bc1",
+            Format::Bc4 => "bc4",
+            Format::Bc5 => "bc5",
+            Format::Bc7 => "bc7",
+            Format::Rgba8 => "rgba8",
+            Format::Rgba16F => "rgba16f",
+        };
+        Output {
+            file,
+            map: map.into(),
+            format: format.into(),
+            transfer: if texture.transfer == Transfer::Srgb { "srgb" } else { "linear" },
+            width: texture.levels[0].width,
+            height: texture.levels[0].height,
+            levels: texture.levels.len(),
+            bytes: bytes.len(),
+            blake3: blake3::hash(bytes).to_hex().to_string(),
+        }
+    }
+}
+
+/// One surface's textures.
+#[derive(Clone, Debug, Serialize)]
+pub struct SurfaceReport {
+    /// The material, or the first one that uses the surface.
+    pub name: String,
+    /// What went in.
+    pub inputs: Vec<Input>,
+    /// What came out.
+    pub outputs: Vec<Output>,
+    /// Errors of normals and lobe, level by level; empty where the material has neither.
+    pub levels: Vec<LevelError>,
+}
+
+/// What one run baked.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Kinran's version.
+    pub kinran: &'static str,
+    /// The filter's name.
+    pub filter: &'static str,
+    /// The footprint's shape.
+    pub kernel: String,
+    /// The surfaces.
+    pub surfaces: Vec<SurfaceReport>,
+    /// What was left out or assumed, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+impl Report {
+    pub(super) fn new(args: &super::Args) -> Self {
+        Report {
+            kinran: env!("CARGO_PKG_VERSION"),
+            filter: args.filter.name(),
+            kernel: format!("{:?}", args.kernel).to_lowercase(),
+            surfaces: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    pub(super) fn write(&self, path: &Path) -> Result<(), Error> {
+        let mut text = serde_json::to_string_pretty(self).map_err(|e| Error::Internal(e.to_string()))?;
+        text.push('\n');
+        Ok(write_atomically(path, text.as_bytes())?)
+    }
+
+    /// A few lines for people: each file with its format and size, and the filter's error.
+    pub(super) fn text(&self, folder: &Path) -> String {
+        let mut text = String::new();
+        let files = || self.surfaces.iter().flat_map(|s| &s.outputs);
+        let width = files().map(|o| o.file.chars().count()).max().unwrap_or(0);
+        for o in files() {
+            text += &format!(
+                "{:width$}  {:7} {:6} {:>11}  {:2} levels  {:>9.1} KiB\n",
+                o.file,
+                o.format,
+                o.transfer,
+                format!("{}x{}", o.width, o.height),
+                o.levels,
+                o.bytes as f64 / 1024.0,
+            );
+        }
+        let bytes: usize = files().map(|o| o.bytes).sum();
+        text + &format!(
+            "{} files, {:.1} KiB, in {}\n",
+            files().count(),
+            bytes as f64 / 1024.0,
+            folder.display()
+        )
+    }
+}
+
+/// Hash of a file as hexadecimal digits.
+pub(super) fn hash_file(path: &Path) -> Result<String, Error> {
+    let mut hasher = blake3::Hasher::new();
+    let mut file = std::fs::File::open(path).map_err(|e| kinran_image::Error::io(path, e))?;
+    hasher.update_reader(&mut file).map_err(|e| kinran_image::Error::io(path, e))?;
+    Ok(hasher.finalize().to_hex().to_string())
+}

@@ -1,0 +1,54 @@
+use std::fmt::Display;
+use std::io::{ErrorKind, Write, stderr, stdout};
+
+use serde::Serialize;
+
+use crate::{Error, Progress};
+
+/// Where a command's words go: results to standard output, everything else to standard error.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Console {
+    /// Errors only.
+    pub quiet: bool,
+    /// Results as JSON.
+    pub json: bool,
+}
+
+impl Console {
+    /// Prints a command's result: `text` for people, or `data` as JSON where that was asked for. Text is
+    /// left out when quiet, JSON is not. A reader that stops reading is no error.
+    ///
+    /// # Errors
+    /// [`Error::Stdout`] where standard output fails in another way.
+    pub fn result(&self, data: &impl Serialize, text: &str) -> Result<(), Error> {
+        let text = match (self.json, self.quiet) {
+            (true, _) => serde_json::to_string_pretty(data).map_err(|e| Error::Internal(e.to_string()))?,
+            (false, false) => text.trim_end().to_owned(),
+            (false, true) => return Ok(()),
+        };
+        let mut out = stdout().lock();
+        match writeln!(out, "{text}").and_then(|()| out.flush()) {
+            Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(e.into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Tells a warning, unless quiet.
+    pub fn warn(&self, warning: impl Display) {
+        if !self.quiet {
+            // Nobody is left to tell that standard error is closed.
+            let _ = writeln!(stderr(), "warning: {warning}");
+        }
+    }
+
+    /// Tells an error, in one line.
+    pub fn error(&self, error: impl Display) {
+        let line = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+        let _ = writeln!(stderr(), "error: {line}");
+    }
+
+    /// Progress bars that show unless quiet or JSON is asked for.
+    pub fn progress(&self) -> Progress {
+        Progress::new(!self.quiet && !self.json)
+    }
+}

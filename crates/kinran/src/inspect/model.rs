@@ -1,0 +1,196 @@
+//! What is inside a glTF file.
+
+use std::path::Path;
+
+use kinran_bake::aniso::RoughnessMaps;
+use kinran_bake::{NoSurface, material_surface};
+use kinran_image::{Pixels, full_level_count};
+use kinran_scene::{Document, LightKind, Material, Scene, TextureRef};
+use serde::Serialize;
+
+use crate::render::triangles;
+use crate::table::list;
+use crate::view::file_name;
+use crate::{Console, Error};
+
+#[derive(Serialize)]
+struct Report {
+    file: String,
+    kind: &'static str,
+    triangles: usize,
+    instances: usize,
+    primitives: Vec<PrimitiveReport>,
+    materials: Vec<MaterialReport>,
+    cameras: Vec<CameraReport>,
+    lights: Vec<&'static str>,
+    extensions_used: Vec<String>,
+    extensions_required: Vec<String>,
+    warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct PrimitiveReport {
+    triangles: usize,
+    vertices: usize,
+    instances: usize,
+    uv_sets: usize,
+    material: String,
+}
+
+#[derive(Serialize)]
+struct MaterialReport {
+    name: String,
+    maps: Vec<MapReport>,
+    /// What `kinran bake` does with it.
+    bake: String,
+    /// Extensions that neither change the bake nor the picture.
+    ignored_extensions: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct MapReport {
+    slot: &'static str,
+    width: u32,
+    height: u32,
+    channels: usize,
+    bits: u32,
+    uv_set: usize,
+}
+
+#[derive(Serialize)]
+struct CameraReport {
+    position: [f32; 3],
+    yfov_degrees: f32,
+}
+
+pub(super) fn inspect(path: &Path, console: &Console) -> Result<(), Error> {
+    let document = Document::open(path)?;
+    let scene = Scene::load(path)?;
+    let strings = |key: &str| -> Vec<String> {
+        let values = document.json().get(key).and_then(|v| v.as_array());
+        values.into_iter().flatten().filter_map(|v| v.as_str().map(str::to_owned)).collect()
+    };
+    let primitives = scene.primitives.iter().enumerate().map(|(i, p)| PrimitiveReport {
+        triangles: p.triangles.len(),
+        vertices: p.positions.len(),
+        instances: scene.instances.iter().filter(|instance| instance.primitive == i).count(),
+        uv_sets: p.uvs.iter().filter(|uvs| !uvs.is_empty()).count(),
+        material: scene.materials[p.material].name.clone(),
+    });
+    let materials = scene.materials.iter().enumerate().map(|(i, m)| MaterialReport {
+        name: m.name.clone(),
+        maps: maps(&scene, m),
+        bake: bake(&scene, i),
+        ignored_extensions: m.ignored_extensions.clone(),
+    });
+    let cameras = scene.cameras.iter().map(|camera| CameraReport {
+        position: camera.transform.translation.to_array(),
+        yfov_degrees: camera.yfov.to_degrees(),
+    });
+    let lights = scene.lights.iter().map(|light| match light.kind {
+        LightKind::Directional => "directional",
+        LightKind::Point => "point",
+        LightKind::Spot { .. } => "spot",
+    });
+    let report = Report {
+        file: file_name(path),
+        kind: "model",
+        triangles: triangles(&scene),
+        instances: scene.instances.len(),
+        primitives: primitives.collect(),
+        materials: materials.collect(),
+        cameras: cameras.collect(),
+        lights: lights.collect(),
+        extensions_used: strings("extensionsUsed"),
+        extensions_required: strings("extensionsRequired"),
+        warnings: scene.warnings.clone(),
+    };
+    console.result(&report, &text(&report))
+}
+
+fn maps(scene: &Scene, m: &Material) -> Vec<MapReport> {
+    let anisotropy = m.anisotropy.as_ref().and_then(|a| a.texture.as_ref());
+    let slots: [(&str, Option<&TextureRef>); 6] = [
+        ("baseColor", m.base_color.as_ref()),
+        ("metallicRoughness", m.metallic_roughness.as_ref()),
+        ("normal", m.normal.as_ref()),
+        ("anisotropy", anisotropy),
+        ("occlusion", m.occlusion.as_ref()),
+        ("emissive", m.emissive.as_ref()),
+    ];
+    let report = |(slot, place): (&'static str, Option<&TextureRef>)| {
+        let place = place?;
+        let image = scene.images.get(place.image)?.as_ref()?;
+        Some(MapReport {
+            slot,
+            width: image.width,
+            height: image.height,
+            channels: image.channels.count(),
+            bits: match image.pixels {
+                Pixels::U8(_) => 8,
+                Pixels::U16(_) => 16,
+                Pixels::F32(_) => 32,
+            },
+            uv_set: place.uv_set,
+        })
+    };
+    slots.into_iter().filter_map(report).collect()
+}
+
+/// What `kinran bake` does with a material, in words.
+fn bake(scene: &Scene, material: usize) -> String {
+    match material_surface(scene, material) {
+        Ok(surface) => {
+            let (width, height) = surface.maps.size();
+            let what = match surface.maps.roughness {
+                RoughnessMaps::Isotropic(_) => "normal and roughness",
+                _ => "normal and anisotropy",
+            };
+            format!("{what}, {width}x{height}, {} levels", full_level_count(width, height))
+        }
+        Err(NoSurface::Plain) => "nothing: it has neither a normal nor an anisotropy map".into(),
+        Err(NoSurface::Apart(reason)) => format!("nothing: {reason}"),
+    }
+}
+
+fn text(report: &Report) -> String {
+    let row = |name: &str, value: String| vec![name.to_owned(), value];
+    let or_none = |values: &[String]| if values.is_empty() { "none".into() } else { values.join(", ") };
+    let mut facts = vec![
+        row("file", report.file.clone()),
+        row("triangles", format!("{} in {} instances", report.triangles, report.instances)),
+        row("extensions", or_none(&report.extensions_used)),
+    ];
+    if !report.extensions_required.is_empty() {
+        facts.push(row("required", or_none(&report.extensions_required)));
+    }
+    if !report.lights.is_empty() {
+        facts.push(row("lights", report.lights.join(", ")));
+    }
+    facts.extend(report.cameras.iter().enumerate().map(|(i, camera)| {
+        let [x, y, z] = camera.position;
+        row(&format!("camera {i}"), format!("at {x:.3}, {y:.3}, {z:.3}, {:.1} degrees", camera.yfov_degrees))
+    }));
+    facts.extend(report.warnings.iter().map(|warning| row("warning", warning.clone())));
+
+    let headings = ["primitive", "triangles", "vertices", "instances", "UV sets", "material"];
+    let mut primitives = vec![headings.map(str::to_owned).to_vec()];
+    primitives.extend(report.primitives.iter().enumerate().map(|(i, p)| {
+        let numbers = [i, p.triangles, p.vertices, p.instances, p.uv_sets].map(|n| n.to_string());
+        [&numbers[..], std::slice::from_ref(&p.material)].concat()
+    }));
+
+    let mut text = format!("{}\n{}", list(&facts), list(&primitives));
+    for m in &report.materials {
+        let mut rows = vec![row("  bake", m.bake.clone())];
+        rows.extend(m.maps.iter().map(|map| {
+            let MapReport { slot, width, height, channels, bits, uv_set } = map;
+            row(&format!("  {slot}"), format!("{width}x{height}, {channels} x {bits} bits, UV set {uv_set}"))
+        }));
+        if !m.ignored_extensions.is_empty() {
+            rows.push(row("  ignored", m.ignored_extensions.join(", ")));
+        }
+        text += &format!("\nmaterial {}\n{}", m.name, list(&rows));
+    }
+    text
+}

@@ -1,0 +1,117 @@
+//! What is inside a KTX2 or DDS file.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use clap::ValueEnum;
+use kinran_image::{Format, Texture, Transfer, read_texture};
+use serde::Serialize;
+
+use super::statistics::Statistics;
+use super::{MapRole, bytes_text};
+use crate::table::{list, table};
+use crate::view::file_name;
+use crate::{Console, Error};
+
+/// The key under which `kinran bake` says what a texture holds.
+const ROLE_KEY: &str = "KinranMap";
+
+#[derive(Serialize)]
+struct Report {
+    file: String,
+    kind: &'static str,
+    format: String,
+    transfer: String,
+    width: u32,
+    height: u32,
+    file_bytes: u64,
+    texture_bytes: u64,
+    role: MapRole,
+    metadata: BTreeMap<String, String>,
+    levels: Vec<LevelReport>,
+}
+
+#[derive(Serialize)]
+struct LevelReport {
+    width: u32,
+    height: u32,
+    bytes: u64,
+    #[serde(flatten)]
+    statistics: Statistics,
+}
+
+pub(super) fn inspect(path: &Path, role: Option<MapRole>, console: &Console) -> Result<(), Error> {
+    let texture = read_texture(path)?;
+    let file_bytes = std::fs::metadata(path).map_err(|e| kinran_image::Error::io(path, e))?.len();
+    let role = match role {
+        Some(role) => role,
+        None => stored_role(path, &texture)?,
+    };
+    let levels = texture.levels.iter().enumerate().map(|(i, level)| -> Result<LevelReport, Error> {
+        let statistics = Statistics::new(role, &texture.decode_level(i)?)
+            .ok_or_else(|| Error::Internal(format!("{}: level {i} has no texels", path.display())))?;
+        let bytes = level.data.len() as u64;
+        Ok(LevelReport { width: level.width, height: level.height, bytes, statistics })
+    });
+    let levels: Vec<LevelReport> = levels.collect::<Result<_, _>>()?;
+    let report = Report {
+        file: file_name(path),
+        kind: "texture",
+        format: format!("{:?}", texture.format).to_uppercase(),
+        transfer: format!("{:?}", texture.transfer).to_lowercase(),
+        width: texture.levels[0].width,
+        height: texture.levels[0].height,
+        file_bytes,
+        texture_bytes: levels.iter().map(|level| level.bytes).sum(),
+        role,
+        metadata: texture.metadata,
+        levels,
+    };
+    console.result(&report, &text(&report))
+}
+
+/// What the texture's own key says it holds, else what its format suggests.
+fn stored_role(path: &Path, texture: &Texture) -> Result<MapRole, Error> {
+    if let Some(name) = texture.metadata.get(ROLE_KEY) {
+        return MapRole::from_str(name, false).map_err(|_| {
+            let reason = format!("key {ROLE_KEY}: \"{name}\" is no map that is known; say --role what it is");
+            kinran_image::Error::malformed(path, reason).into()
+        });
+    }
+    Ok(match (texture.format, texture.transfer) {
+        (Format::Bc5, _) => MapRole::Normal,
+        (_, Transfer::Srgb) => MapRole::Color,
+        _ => MapRole::Data,
+    })
+}
+
+fn text(report: &Report) -> String {
+    let role = report.role.to_possible_value().expect("no role is hidden");
+    let row = |name: &str, value: String| vec![name.to_owned(), value];
+    let mut facts = vec![
+        row("file", format!("{}, {}", report.file, bytes_text(report.file_bytes))),
+        row("format", format!("{}, {}", report.format, report.transfer)),
+        row(
+            "size",
+            format!(
+                "{}x{}, {} levels, {}",
+                report.width,
+                report.height,
+                report.levels.len(),
+                bytes_text(report.texture_bytes)
+            ),
+        ),
+        row("map", role.get_name().into()),
+    ];
+    facts.extend(report.metadata.iter().map(|(key, value)| row(key, value.clone())));
+
+    let headings = ["level", "size", "bytes"].into_iter().chain(Statistics::headings(report.role));
+    let mut rows = vec![headings.map(str::to_owned).collect()];
+    rows.extend(report.levels.iter().enumerate().map(|(i, level)| {
+        let mut cells =
+            vec![i.to_string(), format!("{}x{}", level.width, level.height), bytes_text(level.bytes)];
+        cells.extend(level.statistics.cells());
+        cells
+    }));
+    format!("{}\n{}", list(&facts), table(&rows))
+}

@@ -1,0 +1,24 @@
+//! The commands of `kinran`, as functions.
+//!
+//! Each command is a module: its flags (`Args`), the function that `main` calls (`run`), and the work itself
+//! as a function that other commands can call.
+
+pub mod bake;
+pub mod compare;
+mod compare_sheet;
+mod console;
+pub mod demo;
+mod error;
+pub mod inspect;
+mod outputs;
+pub mod picture;
+mod progress;
+pub mod render;
+pub mod surfaces;
+mod table;
+mod values;
+pub mod view;
+
+pub use console::Console;
+pub use error::Error;
+pub use progress::{Progress, Stage};

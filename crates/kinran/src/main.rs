@@ -1,0 +1,74 @@
+//! The command line.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use kinran::{Console, Error, bake, compare, demo, inspect, render};
+
+/// Anisotropic materials from authored maps to pictures.
+#[derive(Parser)]
+#[command(name = "kinran", version, max_term_width = 100, arg_required_else_help = true)]
+#[command(after_help = "Examples:
+  kinran demo
+  kinran bake model.glb -o baked/
+  kinran render model.glb -o model.png
+  kinran compare model.glb -o comparison/
+  kinran inspect model_normal.ktx2
+
+Angles are degrees. `kinran help COMMAND` tells all about a command.
+Exit codes: 0 done, 2 something in the input or the flags is wrong, 1 a defect of the program.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+
+    /// Worker threads; the default is one for each core. Results are the same for any number
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+
+    /// No progress, no warnings, no summary; errors only
+    #[arg(long, short, global = true)]
+    quiet: bool,
+
+    /// The summary as JSON on standard output, for programs; implies no progress
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Demo(demo::Args),
+    Bake(bake::Args),
+    Render(render::Args),
+    Compare(compare::Args),
+    Inspect(inspect::Args),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let console = Console { quiet: cli.quiet, json: cli.json };
+    match start_threads(cli.threads).and_then(|()| run(&cli.command, &console)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            console.error(&error);
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn run(command: &Command, console: &Console) -> Result<(), Error> {
+    match command {
+        Command::Demo(args) => demo::run(args, console),
+        Command::Bake(args) => bake::run(args, console),
+        Command::Render(args) => render::run(args, console),
+        Command::Compare(args) => compare::run(args, console),
+        Command::Inspect(args) => inspect::run(args, console),
+    }
+}
+
+fn start_threads(threads: Option<u16>) -> Result<(), Error> {
+    let Some(threads) = threads else { return Ok(()) };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.into())
+        .build_global()
+        .map_err(|e| Error::Usage(format!("--threads {threads}: {e}; ask for fewer")))
+}

@@ -1,0 +1,129 @@
+//! `kinran render`: a picture of a glTF file.
+
+use std::path::{Path, PathBuf};
+
+use kinran_image::{Channels, Image, Pixels, write_exr, write_png};
+use kinran_render::reference::TextureFiltering;
+use kinran_scene::Scene;
+use serde::Serialize;
+
+use crate::surfaces::{Mips, scene_surfaces};
+use crate::values::filter;
+use crate::view::{View, ViewArgs, file_name};
+use crate::{Console, Error, outputs};
+
+/// Renders a glTF file on the CPU
+///
+/// Every material with a normal or an anisotropy map is baked in memory first, with the filter that --filter
+/// names and the block compression that `kinran bake` uses, and drawn with the mips that result, as a GPU
+/// would sample them. The same input gives the same picture, bit by bit, on any number of threads.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  kinran render lamp.glb -o lamp.png
+  kinran render lamp.glb -o lamp.exr --size 1920x1080 --spp 256 --env studio.hdr --env-rotation 90
+  kinran render lamp.glb -o far.png --distance 8 --filter naive
+  kinran render lamp.glb -o truth.png --filter none --spp 1024
+  kinran render lamp.glb -o sun.png --env none --light 1,2,1 --background 0.2,0.3,0.5")]
+pub struct Args {
+    /// The .glb or .gltf file
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+
+    /// The picture: .png for displays, .exr for linear radiance
+    #[arg(long, short, value_name = "PICTURE")]
+    pub output: PathBuf,
+
+    /// Samples in a pixel
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub spp: u32,
+
+    /// Which mips are baked before rendering: ml, linear, param, lean or naive; none samples level 0
+    /// alone, uncompressed, which with many samples in a pixel is ground truth
+    #[arg(long, value_name = "NAME", default_value = "ml", value_parser = mips)]
+    pub filter: Mips,
+
+    /// The most places along a slanted pixel's footprint at which a texture is read; 1 is trilinear
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub max_anisotropy: u32,
+
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub view: ViewArgs,
+}
+
+fn mips(text: &str) -> Result<Mips, String> {
+    if text == "none" {
+        return Ok(Mips::Level0);
+    }
+    filter(text).map(Mips::Filtered).map_err(|e| format!("{e}, none"))
+}
+
+#[derive(Serialize)]
+struct Summary {
+    output: String,
+    width: u32,
+    height: u32,
+    samples_per_pixel: u32,
+    filter: &'static str,
+    triangles: usize,
+    warnings: Vec<String>,
+}
+
+/// The command.
+///
+/// # Errors
+/// One that names the file: input that cannot be read, output that cannot be written, flags that do not fit
+/// the file.
+pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    outputs::check_file(&args.output, &["png", "exr"])?;
+    let scene = Scene::load(&args.file)?;
+    let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
+    let progress = console.progress();
+    let (surfaces, apart) = scene_surfaces(&scene, args.filter, &progress)?;
+    let warnings: Vec<String> = scene.warnings.iter().cloned().chain(apart).collect();
+    warnings.iter().for_each(|w| console.warn(w));
+
+    let filtering = match args.filter {
+        Mips::Level0 => TextureFiltering::Level0,
+        Mips::Filtered(_) => TextureFiltering::Mips { max_anisotropy: args.max_anisotropy },
+    };
+    let prepared = view.scene(&scene, surfaces)?;
+    let film = view.render(&prepared, "render", args.spp, filtering, &progress)?;
+    if outputs::has_extension(&args.output, "exr") {
+        let pixels = Pixels::F32(film.pixels.into_flattened());
+        write_exr(&args.output, &Image::new(film.width, film.height, Channels::Rgb, pixels)?)?;
+    } else {
+        write_rgb8(&args.output, film.width, film.height, view.display(&film))?;
+    }
+
+    let summary = Summary {
+        output: file_name(&args.output),
+        width: film.width,
+        height: film.height,
+        samples_per_pixel: args.spp,
+        filter: args.filter.name(),
+        triangles: triangles(&scene),
+        warnings,
+    };
+    let text = format!(
+        "{}: {}x{}, {} samples a pixel, {} triangles, filter {}",
+        args.output.display(),
+        summary.width,
+        summary.height,
+        summary.samples_per_pixel,
+        summary.triangles,
+        summary.filter
+    );
+    console.result(&summary, &text)
+}
+
+/// Triangles in the world, instances counted each.
+pub(crate) fn triangles(scene: &Scene) -> usize {
+    scene.instances.iter().map(|i| scene.primitives[i.primitive].triangles.len()).sum()
+}
+
+/// Writes an 8-bit PNG.
+pub(crate) fn write_rgb8(path: &Path, width: u32, height: u32, pixels: Vec<[u8; 3]>) -> Result<(), Error> {
+    let pixels = Pixels::U8(pixels.into_flattened());
+    Ok(write_png(path, &Image::new(width, height, Channels::Rgb, pixels)?)?)
+}

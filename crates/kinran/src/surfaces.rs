@@ -1,0 +1,161 @@
+//! The textures that a renderer draws a scene's surfaces with.
+
+use std::sync::Arc;
+
+use kinran_bake::aniso::{
+    Filter, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps, SurfaceOptions, TexelSpan,
+    bake_surface,
+};
+use kinran_bake::{NoSurface, material_surface};
+use kinran_image::{Role, full_level_count, level_size};
+use kinran_render::reference::{BoundTexture, MipLevel, MipTexture, SurfaceTextures};
+use kinran_scene::{Material, Scene, TextureRef};
+
+use crate::{Error, Progress};
+
+/// Which texels surfaces are drawn with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Mips {
+    /// A filter's mip chain as it is after block compression: BC5 normals, BC7 aniso.
+    Filtered(Filter),
+    /// Level 0 alone, in floats: ground truth.
+    Level0,
+}
+
+impl Mips {
+    /// The filter's name, or `truth`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Mips::Filtered(filter) => filter.name(),
+            Mips::Level0 => "truth",
+        }
+    }
+}
+
+/// Surface textures of every material of `scene`, `None` for those without a normal or anisotropy map, and a
+/// sentence for each material whose maps could not be filtered together.
+///
+/// # Errors
+/// [`Error::Image`] where an encoder refuses.
+pub fn scene_surfaces(
+    scene: &Scene,
+    mips: Mips,
+    progress: &Progress,
+) -> Result<(Vec<Option<SurfaceTextures>>, Vec<String>), Error> {
+    let mut warnings = Vec::new();
+    let surfaces = (0..scene.materials.len()).map(|i| match material_surface(scene, i) {
+        Ok(surface) => {
+            let sheets = [Sheet::Normal, Sheet::Aniso];
+            let [normal, aniso] = textures(&surface.maps, sheets, mips, &scene.materials[i].name, progress)?;
+            Ok(Some(SurfaceTextures {
+                normal: BoundTexture::new(normal, &surface.place),
+                aniso: BoundTexture::new(aniso, &surface.place),
+            }))
+        }
+        Err(NoSurface::Plain) => Ok(None),
+        Err(NoSurface::Apart(reason)) => {
+            warnings.push(reason);
+            separate_surface(scene, &scene.materials[i], mips, progress).map(Some)
+        }
+    });
+    let surfaces = surfaces.collect::<Result<_, Error>>()?;
+    Ok((surfaces, warnings))
+}
+
+/// The sheets of a surface as decoded mip chains.
+fn textures<const N: usize>(
+    maps: &SurfaceMaps,
+    sheets: [Sheet; N],
+    mips: Mips,
+    name: &str,
+    progress: &Progress,
+) -> Result<[Arc<MipTexture>; N], Error> {
+    let size = maps.size();
+    let Mips::Filtered(filter) = mips else {
+        return Ok(sheets.map(|sheet| Arc::new(level_0(maps, sheet))));
+    };
+    let requests = sheets.map(|sheet| {
+        let role = if sheet == Sheet::Normal { Role::Normal } else { Role::Aniso };
+        SheetRequest { sheet, encoding: role.encoding(), packed_with: None }
+    });
+    let texels = (0..full_level_count(size.0, size.1))
+        .map(|level| u64::from(level_size(size.0, level)) * u64::from(level_size(size.1, level)))
+        .sum();
+    let stage = progress.stage(format!("{} {name}", filter.name()), texels);
+    let options = SurfaceOptions { filter, ..SurfaceOptions::default() };
+    let baked = bake_surface(maps, options, &requests, &|texels| stage.add(texels))?;
+    let decoded: Vec<_> = baked
+        .textures
+        .iter()
+        .map(|texture| MipTexture::from_texture(texture, maps.wrap).map(Arc::new))
+        .collect::<Result<_, _>>()?;
+    decoded.try_into().map_err(|_| Error::Internal("a sheet that was asked for was not baked".into()))
+}
+
+/// The authored texels, uncompressed.
+fn level_0(maps: &SurfaceMaps, sheet: Sheet) -> MipTexture {
+    let (width, height) = maps.size();
+    let mut span = TexelSpan::default();
+    let mut texels = Vec::with_capacity(width as usize * height as usize);
+    for y in 0..height {
+        maps.decode_span((width, height), y, 0, width as usize, &mut span);
+        texels.extend((0..span.len()).map(|i| {
+            let (n, a) = span.texel(i);
+            let [r, g, b] = sheet.encode(n, a);
+            [r, g, b, 1.0]
+        }));
+    }
+    MipTexture { levels: vec![MipLevel { width, height, texels }], wrap: maps.wrap }
+}
+
+/// Normals and roughness that lie on the mesh in different ways, each filtered by itself. Roughness is then
+/// relative to a flat normal map: exact for isotropic materials, and close for others where bumps are low. A
+/// roughness map that lies apart from an anisotropy map is left out.
+fn separate_surface(
+    scene: &Scene,
+    m: &Material,
+    mips: Mips,
+    progress: &Progress,
+) -> Result<SurfaceTextures, Error> {
+    let image = |place: Option<&TextureRef>| scene.images.get(place?.image)?.clone();
+    let anisotropy = m.anisotropy.as_ref().filter(|a| a.strength > 0.0);
+    let anisotropy_place = anisotropy.and_then(|a| a.texture.as_ref());
+    let roughness_place = m.metallic_roughness.as_ref();
+    let together = |a: &TextureRef| TextureRef { image: 0, ..a.clone() };
+    let roughness_place =
+        roughness_place.filter(|r| anisotropy_place.is_none_or(|a| together(a) == together(r)));
+
+    let roughness =
+        ScalarMap { image: image(roughness_place).map(|image| (image, 1)), factor: m.roughness_factor };
+    let roughness = match anisotropy {
+        Some(a) => RoughnessMaps::Khr {
+            roughness,
+            strength: a.strength,
+            rotation: a.rotation,
+            texture: image(anisotropy_place),
+        },
+        None => RoughnessMaps::Isotropic(roughness),
+    };
+    let bound = |sheet, place: Option<&TextureRef>, normal, roughness| -> Result<BoundTexture, Error> {
+        let wrap = place.map_or([kinran_scene::Wrap::Repeat; 2], |place| place.wrap);
+        let maps = SurfaceMaps { normal, roughness, wrap };
+        let [texture] = textures(&maps, [sheet], mips, &m.name, progress)?;
+        Ok(match place {
+            Some(place) => BoundTexture::new(texture, place),
+            None => BoundTexture { texture, ..BoundTexture::constant([0.0; 4]) },
+        })
+    };
+    let normal = image(m.normal.as_ref()).map_or_else(NormalMap::flat, |image| NormalMap {
+        scale: m.normal_scale,
+        ..NormalMap::new(image, false)
+    });
+    Ok(SurfaceTextures {
+        normal: bound(
+            Sheet::Normal,
+            m.normal.as_ref(),
+            normal,
+            RoughnessMaps::Isotropic(ScalarMap::constant(1.0)),
+        )?,
+        aniso: bound(Sheet::Aniso, anisotropy_place.or(roughness_place), NormalMap::flat(), roughness)?,
+    })
+}

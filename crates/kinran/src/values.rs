@@ -1,0 +1,69 @@
+//! What people type as flags.
+
+use glam::Vec3;
+use kinran_bake::aniso::Filter;
+use kinran_image::MAX_SIDE;
+
+/// `WIDTHxHEIGHT` in pixels, or one number for a square.
+pub(crate) fn size(text: &str) -> Result<(u32, u32), String> {
+    let (width, height) = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
+    match (width.trim().parse(), height.trim().parse()) {
+        (Ok(w), Ok(h)) if (1..=MAX_SIDE).contains(&w) && (1..=MAX_SIDE).contains(&h) => Ok((w, h)),
+        _ => Err(format!("write WIDTHxHEIGHT, such as 1280x720, each 1 to {MAX_SIDE}")),
+    }
+}
+
+/// `X,Y,Z`, finite.
+pub(crate) fn vector(text: &str) -> Result<Vec3, String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse::<f32>()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z]) if Vec3::new(x, y, z).is_finite() => Ok(Vec3::new(x, y, z)),
+        _ => Err("write three numbers, such as 0.5,0.3,1".into()),
+    }
+}
+
+/// `X,Y,Z`, of some length.
+pub(crate) fn direction(text: &str) -> Result<Vec3, String> {
+    let v = vector(text)?;
+    v.try_normalize().ok_or_else(|| "a direction must not be zero".into())
+}
+
+/// A finite number within `range`, described by `what`.
+pub(crate) fn number(text: &str, range: std::ops::RangeInclusive<f32>) -> Result<f32, String> {
+    match text.trim().parse::<f32>() {
+        Ok(x) if range.contains(&x) => Ok(x),
+        _ => Err(format!("write a number from {} to {}", range.start(), range.end())),
+    }
+}
+
+/// A filter's name.
+pub(crate) fn filter(text: &str) -> Result<Filter, String> {
+    Filter::ALL.into_iter().find(|f| f.name() == text).ok_or_else(|| {
+        let names = Filter::ALL.map(Filter::name).join(", ");
+        format!("choose one of {names}")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_that_no_picture_has_are_refused() {
+        assert_eq!(size("1280x720"), Ok((1280, 720)));
+        assert_eq!(size("64"), Ok((64, 64)));
+        for bad in ["", "0x4", "4x0", "x", "4x", "-1x4", "40000x4", "1e3", "4x4x4", "99999999999999999999"] {
+            assert!(size(bad).is_err(), "{bad:?} became {:?}", size(bad));
+        }
+    }
+
+    #[test]
+    fn vectors_that_point_nowhere_are_refused() {
+        assert_eq!(vector("1, -2,0.5"), Ok(Vec3::new(1.0, -2.0, 0.5)));
+        for bad in ["", "1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0"] {
+            assert!(vector(bad).is_err(), "{bad:?} became {:?}", vector(bad));
+        }
+        assert!(direction("0,0,0").is_err());
+        assert_eq!(direction("0,0,-7"), Ok(Vec3::NEG_Z));
+    }
+}

@@ -1,0 +1,561 @@
+//! `kinran bake`, run as people run it on tiny folders and models.
+#![allow(
+    clippy::print_stdout,
+    clippy::needless_range_loop,
+    reason = "measured numbers; several arrays by one index"
+)]
+
+#[allow(dead_code, reason = "shared with the other commands' tests")]
+#[path = "commands/common.rs"]
+mod common;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use common::{bumps, files, glb, kinran, kinran_json, refused, square, text};
+use kinran_image::{
+    Channels, Format, Image, Pixels, Texture, Transfer, decode_image, encode_png, read_image, read_texture,
+};
+use serde_json::{Value, json};
+
+fn write(folder: &Path, name: &str, image: &Image) {
+    std::fs::write(folder.join(name), encode_png(image).unwrap()).unwrap();
+}
+
+/// An image of `side`² texels from a formula.
+fn image(side: u32, channels: Channels, texel: impl Fn(u32, u32) -> [u8; 4]) -> Image {
+    let samples = (0..side)
+        .flat_map(|y| (0..side).map(move |x| (x, y)))
+        .flat_map(|(x, y)| texel(x, y)[..channels.count()].to_vec())
+        .collect();
+    Image::new(side, side, channels, Pixels::U8(samples)).unwrap()
+}
+
+/// A folder of maps as Poly Haven names them.
+fn cloth(side: u32) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let scaled = bumps();
+    let bump = |x: u32, y: u32| scaled.texel(x % 32, y % 32).map(|v| (v * 255.0).round() as u8);
+    write(folder.path(), "cloth_nor_gl.png", &image(side, Channels::Rgb, bump));
+    let arm = |x: u32, y: u32| [(x * 7 % 256) as u8, (60 + (x * y) % 120) as u8, (y * 5 % 256) as u8, 255];
+    write(folder.path(), "cloth_arm.png", &image(side, Channels::Rgb, arm));
+    let diff = |x: u32, y: u32| [(x * 3 % 256) as u8, 90, (y * 3 % 256) as u8, 255];
+    write(folder.path(), "cloth_diff.png", &image(side, Channels::Rgb, diff));
+    folder
+}
+
+fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    files(folder).into_iter().map(|f| (f.clone(), std::fs::read(folder.join(&f)).unwrap())).collect()
+}
+
+fn hash(path: &Path) -> String {
+    blake3::hash(&std::fs::read(path).unwrap()).to_hex().to_string()
+}
+
+#[test]
+fn a_folder_gives_files_that_do_not_decode() {
+    let input = cloth(32);
+    let out = tempfile::tempdir().unwrap();
+    let args = ["bake", text(input.path()), "-o", text(out.path()), "--form", "both", "--container", "both"];
+    kinran_json(&args);
+    let wanted = ["aniso", "anisotropy", "color", "normal", "orm"];
+    let wanted: Vec<String> = std::iter::once("cloth.kinran.json".to_owned())
+        .chain(wanted.iter().flat_map(|map| ["dds", "ktx2"].map(|e| format!("cloth_{map}.{e}"))))
+        .collect();
+    assert_eq!(files(out.path()), wanted);
+
+    for (map, format, transfer) in [
+        ("normal", Format::Bc5, Transfer::Linear),
+        ("aniso", Format::Bc7, Transfer::Linear),
+        ("orm", Format::Bc7, Transfer::Linear),
+        ("anisotropy", Format::Bc7, Transfer::Linear),
+        ("color", Format::Bc7, Transfer::Srgb),
+    ] {
+        let read = |e: &str| -> Texture {
+            let texture = read_texture(&out.path().join(format!("cloth_{map}.{e}"))).unwrap();
+            texture.check().unwrap();
+            texture
+        };
+        let (ktx2, dds) = (read("ktx2"), read("dds"));
+        assert_eq!((ktx2.format, ktx2.transfer, ktx2.levels.len()), (format, transfer, 6), "{map}");
+        assert_eq!((ktx2.levels[0].width, ktx2.levels[0].height), (32, 32), "{map}");
+        assert_eq!(ktx2.metadata.get("KinranMap").map(String::as_str), Some(map));
+        assert_eq!(ktx2.metadata.get("KinranFilter").map(String::as_str), Some("ml"));
+        assert!(ktx2.levels == dds.levels && ktx2.format == dds.format, "{map}: DDS holds something else");
+    }
+
+    let report: Value =
+        serde_json::from_slice(&std::fs::read(out.path().join("cloth.kinran.json")).unwrap()).unwrap();
+    assert_eq!((&report["filter"], &report["kernel"]), (&json!("ml"), &json!("box")));
+    assert_eq!(report["kinran"], env!("CARGO_PKG_VERSION"));
+    let surface = &report["surfaces"][0];
+    assert_eq!(surface["name"], "cloth");
+    let inputs = surface["inputs"].as_array().unwrap();
+    assert_eq!(inputs.len(), 3, "{inputs:?}");
+    for input_file in inputs {
+        let path = input.path().join(input_file["file"].as_str().unwrap());
+        assert_eq!(input_file["blake3"], hash(&path), "{input_file}");
+        assert_eq!((&input_file["width"], &input_file["height"]), (&json!(32), &json!(32)));
+    }
+    let outputs = surface["outputs"].as_array().unwrap();
+    assert_eq!(outputs.len(), 10);
+    for output in outputs {
+        let path = out.path().join(output["file"].as_str().unwrap());
+        assert_eq!(output["blake3"], hash(&path), "{output}");
+        assert_eq!(output["bytes"], std::fs::metadata(&path).unwrap().len(), "{output}");
+        assert_eq!(output["levels"], 6, "{output}");
+    }
+    let levels = surface["levels"].as_array().unwrap();
+    assert_eq!(levels.len(), 6);
+    for level in levels {
+        for key in ["ndf_l2", "normal_rms_degrees", "normal_max_degrees", "alpha_t_rms", "alpha_b_rms"] {
+            assert!(level[key].as_f64().is_some_and(|v| v >= 0.0), "{key} in {level}");
+        }
+    }
+    assert!(!report.to_string().contains(text(input.path())), "the report holds a path: {report}");
+}
+
+#[test]
+fn two_runs_give_other_bytes() {
+    let input = cloth(64);
+    let (_folder, model) = square();
+    for source in [input.path(), &model] {
+        let run = |threads: &str| {
+            let out = tempfile::tempdir().unwrap();
+            let args = ["bake", text(source), "-o", text(out.path()), "--form", "both", "--threads", threads];
+            let said = kinran(&args);
+            assert_eq!(said.code, Some(0), "{}", said.err);
+            contents(out.path())
+        };
+        let first = run("1");
+        assert!(first.len() > 3);
+        for threads in ["1", "2", "8"] {
+            let again = run(threads);
+            assert_eq!(first.keys().collect::<Vec<_>>(), again.keys().collect::<Vec<_>>());
+            for (name, bytes) in &first {
+                assert!(*bytes == again[name], "{name} differs with {threads} threads");
+            }
+        }
+    }
+}
+
+/// The square of [`glb`] as a .gltf beside its buffer, with every material feature that must survive.
+fn anisotropic_model(folder: &Path) -> PathBuf {
+    let glb = glb();
+    let json_length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let mut document: Value = serde_json::from_slice(&glb[20..20 + json_length]).unwrap();
+    std::fs::write(folder.join("square.bin"), &glb[20 + json_length + 8..]).unwrap();
+    document["buffers"][0]["uri"] = json!("square.bin");
+    document["images"] =
+        json!([{ "uri": "bumps.png" }, { "uri": "orm.png", "extras": { "from": "painter" } }]);
+    document["bufferViews"].as_array_mut().unwrap().truncate(4);
+    document["samplers"] = json!([{ "wrapS": 33071, "wrapT": 33648 }]);
+    document["textures"] =
+        json!([{ "source": 0, "sampler": 0 }, { "source": 1, "sampler": 0, "name": "orm" }]);
+    document["materials"] = json!([{
+        "name": "hammered",
+        "pbrMetallicRoughness": {
+            "metallicFactor": 0.9, "roughnessFactor": 0.8, "metallicRoughnessTexture": { "index": 1 }
+        },
+        "normalTexture": { "index": 0, "scale": 0.5 },
+        "occlusionTexture": { "index": 1, "strength": 0.7 },
+        "extensions": {
+            "KHR_materials_anisotropy": { "anisotropyStrength": 0.6, "anisotropyRotation": 0.5 },
+            "KHR_materials_clearcoat": { "clearcoatFactor": 0.25 },
+            "EXT_made_up": { "depth": [1, 2, { "three": true }] }
+        },
+        "extras": { "kept": "yes" }
+    }]);
+    document["extensionsUsed"] =
+        json!(["KHR_materials_anisotropy", "KHR_materials_clearcoat", "EXT_made_up"]);
+    document["extras"] = json!({ "author": "me" });
+    write(folder, "bumps.png", &bumps());
+    let orm = |x: u32, y: u32| [(x * 7) as u8, (100 + x + 2 * y) as u8, (255 - y * 7) as u8, 255];
+    write(folder, "orm.png", &image(32, Channels::Rgb, orm));
+    let path = folder.join("square.gltf");
+    std::fs::write(&path, serde_json::to_vec(&document).unwrap()).unwrap();
+    path
+}
+
+#[test]
+fn a_baked_model_means_something_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = anisotropic_model(folder.path());
+    let out = tempfile::tempdir().unwrap();
+    kinran_json(&["bake", text(&model), "-o", text(out.path()), "--container", "both"]);
+
+    let document: Value =
+        serde_json::from_slice(&std::fs::read(out.path().join("square.gltf")).unwrap()).unwrap();
+    let material = &document["materials"][0];
+    let pbr = &material["pbrMetallicRoughness"];
+    // What is in the textures now is no factor any more; the rest stays.
+    assert!(pbr.get("roughnessFactor").is_none_or(|v| *v == json!(1.0)), "{pbr}");
+    assert_eq!(pbr["metallicFactor"], 0.9);
+    assert!(material["normalTexture"].get("scale").is_none_or(|v| *v == json!(1.0)), "{material}");
+    let anisotropy = &material["extensions"]["KHR_materials_anisotropy"];
+    assert_eq!(anisotropy["anisotropyStrength"], json!(1.0));
+    assert!(anisotropy.get("anisotropyRotation").is_none_or(|v| *v == json!(0.0)), "{anisotropy}");
+    assert_eq!(material["extensions"]["KHR_materials_clearcoat"], json!({ "clearcoatFactor": 0.25 }));
+    assert_eq!(material["extensions"]["EXT_made_up"], json!({ "depth": [1, 2, { "three": true }] }));
+    assert_eq!(
+        (&material["extras"], &document["extras"]),
+        (&json!({ "kept": "yes" }), &json!({ "author": "me" }))
+    );
+    // Packed it was and packed it stays.
+    assert_eq!(material["occlusionTexture"]["index"], pbr["metallicRoughnessTexture"]["index"]);
+    assert_eq!(material["occlusionTexture"]["strength"], 0.7);
+
+    // Each texture has a PNG for viewers without extensions and both containers, all of which exist.
+    let uri = |index: &Value| {
+        let uri = document["images"][index.as_u64().unwrap() as usize]["uri"].as_str().unwrap();
+        out.path().join(uri)
+    };
+    let texture = |info: &Value| {
+        let texture = &document["textures"][info["index"].as_u64().unwrap() as usize];
+        assert_eq!(document["samplers"][texture["sampler"].as_u64().unwrap() as usize]["wrapS"], 33071);
+        let extension = |name: &str| uri(&texture["extensions"][name]["source"]);
+        let ktx2 = texture["extensions"].as_object().unwrap().keys().find(|k| !k.contains("dds")).unwrap();
+        let (ktx2, dds) =
+            (read_texture(&extension(ktx2)).unwrap(), read_texture(&extension("MSFT_texture_dds")).unwrap());
+        assert!(ktx2.levels == dds.levels);
+        (ktx2, read_image(&uri(&texture["source"])).unwrap())
+    };
+    let (normal, normal_png) = texture(&material["normalTexture"]);
+    let (orm, orm_png) = texture(&pbr["metallicRoughnessTexture"]);
+    let (lobe, lobe_png) = texture(&anisotropy["anisotropyTexture"]);
+
+    // Level 0 and the fallbacks, texel by texel, against the factors applied here.
+    let (authored, packed) = (bumps(), read_image(&folder.path().join("orm.png")).unwrap());
+    let levels = [normal, orm, lobe].map(|t| t.decode_level(0).unwrap());
+    let (mut worst_normal, mut sums) = (0.0_f32, [0.0_f32; 3]);
+    for i in 0..32 * 32 {
+        let (x, y) = (i as u32 % 32, i as u32 / 32);
+        let near = |name: &str, got: f32, wanted: f32| {
+            assert!((got - wanted).abs() <= 0.51 / 255.0, "{name} of ({x}, {y}): wanted {wanted}, got {got}");
+        };
+        let [nx, ny, ..] = authored.texel(x, y).map(|v| v * 2.0 - 1.0);
+        let nz = (1.0 - nx * nx - ny * ny).sqrt();
+        let length = (0.25 * (nx * nx + ny * ny) + nz * nz).sqrt();
+        let n = [0.5 * nx / length, 0.5 * ny / length];
+        let png = normal_png.texel(x, y);
+        for c in 0..2 {
+            near("normal.png", png[c], n[c] * 0.5 + 0.5);
+            worst_normal = worst_normal.max((levels[0][i][c] - (n[c] * 0.5 + 0.5)).abs());
+        }
+        let wanted = packed.texel(x, y);
+        let png = orm_png.texel(x, y);
+        near("occlusion in orm.png", png[0], wanted[0]);
+        near("roughness in orm.png", png[1], wanted[1] * 0.8);
+        near("metalness in orm.png", png[2], wanted[2]);
+        for c in 0..3 {
+            sums[c] += (levels[1][i][c] - png[c]).powi(2) / 1024.0;
+        }
+        // A normal of no tilt turns nothing; others turn the direction by less than 2° here.
+        let png = lobe_png.texel(x, y);
+        near("strength in anisotropy.png", png[2], 0.6);
+        let angle = (png[1] * 2.0 - 1.0).atan2(png[0] * 2.0 - 1.0);
+        assert!((angle - 0.5).abs() < 0.01, "direction of ({x}, {y}): wanted 0.5, got {angle}");
+    }
+    // BC5 and BC7.
+    assert!(worst_normal < 0.03, "BC5 normals are {worst_normal} off");
+    assert!(sums.iter().all(|s| s.sqrt() < 0.03), "BC7 channels are off by the squares {sums:?}");
+
+    // The program reads its own output.
+    let said = kinran(&["inspect", text(&out.path().join("square.gltf")), "--json"]);
+    assert_eq!(said.code, Some(0), "{}", said.err);
+}
+
+#[test]
+fn a_binary_model_loses_its_mesh() {
+    let (_folder, model) = square();
+    let out = tempfile::tempdir().unwrap();
+    kinran_json(&["bake", text(&model), "-o", text(out.path())]);
+    let names = files(out.path());
+    assert!(
+        names.contains(&"square.glb".into()) && names.contains(&"square.kinran.json".into()),
+        "{names:?}"
+    );
+    for name in names.iter().filter(|n| n.ends_with(".ktx2")) {
+        read_texture(&out.path().join(name)).unwrap().check().unwrap();
+    }
+    let said = kinran_json(&["inspect", text(&out.path().join("square.glb"))]);
+    assert!(said.to_string().contains("hammered"), "{said}");
+}
+
+#[test]
+fn a_dry_run_writes() {
+    let input = cloth(32);
+    let (_folder, model) = square();
+    let parent = tempfile::tempdir().unwrap();
+    let out = parent.path().join("out");
+    for source in [input.path(), &model] {
+        let said = kinran(&["bake", text(source), "-o", text(&out), "--dry-run"]);
+        assert_eq!(said.code, Some(0), "{}", said.err);
+        assert!(!said.out.is_empty());
+        assert!(files(parent.path()).is_empty(), "written: {:?}", files(parent.path()));
+    }
+}
+
+/// The checksum of PNG chunks.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 * (crc & 1)))
+    })
+}
+
+#[test]
+fn bad_folders_are_not_named() {
+    let parent = tempfile::tempdir().unwrap();
+    let out = parent.path().join("out");
+    let case = |name: &str, files: &[(&str, Vec<u8>)]| -> PathBuf {
+        let folder = parent.path().join(name);
+        std::fs::create_dir(&folder).unwrap();
+        for (file, bytes) in files {
+            std::fs::write(folder.join(file), bytes).unwrap();
+        }
+        folder
+    };
+    let png = encode_png(&bumps()).unwrap();
+    let photo =
+        encode_png(&image(32, Channels::Rgb, |x, y| [(x * 8) as u8, (y * 8) as u8, 20, 255])).unwrap();
+    // A sound header, as far as it goes, of 2 billion × 2 billion texels.
+    let mut absurd = png.clone();
+    absurd[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
+    let crc = crc32(&absurd[12..29]);
+    absurd[29..33].copy_from_slice(&crc.to_be_bytes());
+    let bake = |folder: &Path, parts: &[&str]| refused(&["bake", text(folder), "-o", text(&out)], parts);
+    bake(&parent.path().join("missing"), &["missing"]);
+    bake(&case("empty", &[]), &["empty"]);
+    bake(&case("photo", &[("a_normal_gl.png", photo)]), &["a_normal_gl.png"]);
+    bake(&case("truncated", &[("a_normal_gl.png", png[..png.len() / 2].to_vec())]), &["a_normal_gl.png"]);
+    bake(&case("absurd", &[("a_normal_gl.png", absurd)]), &["a_normal_gl.png"]);
+    bake(&case("nothing", &[("a_normal_gl.png", vec![])]), &["a_normal_gl.png"]);
+    assert!(!out.exists() || files(&out).is_empty(), "written: {:?}", files(&out));
+}
+
+#[test]
+fn bad_models_are_not_named() {
+    let (folder, model) = square();
+    let out = folder.path().join("out");
+    let whole = glb();
+    for (name, bytes) in [
+        ("truncated.glb", whole[..whole.len() / 2].to_vec()),
+        ("head.glb", whole[..11].to_vec()),
+        ("nothing.glb", vec![]),
+        ("noise.gltf", vec![0x9f; 100]),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        refused(&["bake", text(&path), "-o", text(&out)], &[name]);
+        std::fs::remove_file(path).unwrap();
+    }
+    refused(&["bake", text(&folder.path().join("gone.glb")), "-o", text(&out)], &["gone.glb"]);
+    // Over the input, and into what is no folder.
+    refused(&["bake", text(&model), "-o", text(folder.path())], &["square.glb"]);
+    refused(&["bake", text(&model), "-o", text(&model)], &["square.glb", "is a file"]);
+    refused(&["bake", text(&model), "-o", text(&model.join("deeper"))], &["square.glb"]);
+    assert_eq!(std::fs::read(&model).unwrap(), whole, "the input has changed");
+    let left: Vec<String> = files(folder.path()).into_iter().filter(|f| f != "out").collect();
+    assert_eq!(left, ["square.glb"]);
+    assert!(!out.exists() || files(&out).is_empty(), "written: {:?}", files(&out));
+}
+
+/// The fallback of a baked normal map is called as the authored map here: written into the authored map's
+/// folder it would destroy it.
+#[test]
+fn a_fallback_overwrites_an_authored_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = anisotropic_model(folder.path());
+    let textures = folder.path().join("textures");
+    std::fs::create_dir(&textures).unwrap();
+    let authored = textures.join("square_hammered_normal.png");
+    std::fs::rename(folder.path().join("bumps.png"), &authored).unwrap();
+    let document = std::fs::read_to_string(&model).unwrap();
+    std::fs::write(&model, document.replace("bumps.png", "textures/square_hammered_normal.png")).unwrap();
+    let before = std::fs::read(&authored).unwrap();
+    refused(&["bake", text(&model), "-o", text(&textures)], &["square_hammered_normal.png"]);
+    assert!(std::fs::read(&authored).unwrap() == before, "the authored map was overwritten");
+}
+
+/// Without a normal map the anisotropy map's coordinates and borders are those of the new roughness map.
+#[test]
+fn a_new_map_lies_on_the_wrong_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = anisotropic_model(folder.path());
+    let mut document: Value = serde_json::from_slice(&std::fs::read(&model).unwrap()).unwrap();
+    let transform = json!({ "KHR_texture_transform": { "scale": [3.0, 2.0] } });
+    document["materials"] = json!([{
+        "pbrMetallicRoughness": { "roughnessFactor": 0.4 },
+        "extensions": { "KHR_materials_anisotropy": {
+            "anisotropyStrength": 0.6, "anisotropyTexture": { "index": 0, "extensions": transform }
+        } }
+    }]);
+    document["extensionsUsed"] = json!(["KHR_materials_anisotropy", "KHR_texture_transform"]);
+    std::fs::write(&model, serde_json::to_vec(&document).unwrap()).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    kinran_json(&["bake", text(&model), "-o", text(out.path())]);
+    let document: Value =
+        serde_json::from_slice(&std::fs::read(out.path().join("square.gltf")).unwrap()).unwrap();
+    let info = &document["materials"][0]["pbrMetallicRoughness"]["metallicRoughnessTexture"];
+    assert_eq!(info["extensions"], transform, "{info}");
+    let texture = &document["textures"][info["index"].as_u64().unwrap() as usize];
+    assert_eq!(
+        document["samplers"][texture["sampler"].as_u64().unwrap() as usize]["wrapT"],
+        33648,
+        "{texture}"
+    );
+}
+
+#[test]
+fn flags_that_make_no_sense_are_accepted() {
+    let input = cloth(32);
+    let parent = tempfile::tempdir().unwrap();
+    let out = parent.path().join("out");
+    for (flag, value) in [
+        ("--filter", "best"),
+        ("--kernel", "gauss"),
+        ("--edges", "black"),
+        ("--form", "gloss"),
+        ("--container", "png"),
+        ("--zstd", "23"),
+        ("--zstd", "-1"),
+        ("--normal-format", "bc4"),
+        ("--aniso-format", "bc5"),
+        ("--color-format", "rgba16f"),
+        ("--normal-format", "bc6h"),
+        ("--encoder", "fast"),
+        ("--preset", "slowest"),
+        ("--roughness", "1.5"),
+        ("--roughness", "nan"),
+        ("--anisotropy", "-0.1"),
+        ("--direction-span", "0"),
+        ("--map", "normal"),
+        ("--map", "shine=cloth_arm.png"),
+        ("--map", "gloss-u=gone.png"),
+        ("--ignore", "gone.png"),
+    ] {
+        refused(&["bake", text(input.path()), "-o", text(&out), &format!("{flag}={value}")], &[flag]);
+    }
+    refused(&["bake", text(input.path()), "-o", text(&out), "--y-up", "--y-down"], &["--y-up"]);
+    refused(&["bake", text(input.path())], &["--output"]);
+    assert!(files(parent.path()).is_empty(), "written: {:?}", files(parent.path()));
+}
+
+/// Every format that is asked for is what the files hold.
+#[test]
+fn formats_on_request_are_others() {
+    let input = cloth(16);
+    for (name, format) in
+        [("bc1", Format::Bc1), ("bc7", Format::Bc7), ("rgba8", Format::Rgba8), ("rgba16f", Format::Rgba16F)]
+    {
+        let out = tempfile::tempdir().unwrap();
+        kinran_json(&[
+            "bake",
+            text(input.path()),
+            "-o",
+            text(out.path()),
+            "--normal-format",
+            name,
+            "--aniso-format",
+            name,
+        ]);
+        for map in ["normal", "aniso", "orm"] {
+            let texture = read_texture(&out.path().join(format!("cloth_{map}.ktx2"))).unwrap();
+            assert_eq!(texture.format, format, "{map}");
+            texture.check().unwrap();
+        }
+        // Occlusion and metalness are not lost with any of them.
+        let orm = read_texture(&out.path().join("cloth_orm.ktx2")).unwrap().decode_level(0).unwrap();
+        let authored = read_image(&input.path().join("cloth_arm.png")).unwrap();
+        for c in [0, 2] {
+            let error: f32 = (0..256)
+                .map(|i| (orm[i][c] - authored.texel(i as u32 % 16, i as u32 / 16)[c]).abs() / 256.0)
+                .sum();
+            assert!(error < 0.05, "{name}: channel {c} is {error} off on average");
+        }
+    }
+}
+
+/// Killed at any moment, a run leaves files that are whole, and its temporary ones under names that say so.
+#[test]
+fn a_killed_run_leaves_half_a_file() {
+    let input = cloth(1024);
+    for delay in [100, 600, 1500, 3000] {
+        let out = tempfile::tempdir().unwrap();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_kinran"))
+            .args([
+                "bake",
+                text(input.path()),
+                "-o",
+                text(out.path()),
+                "--container",
+                "both",
+                "--form",
+                "both",
+            ])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_millis(delay) && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        for name in files(out.path()).into_iter().filter(|name| !name.starts_with(".kinran-")) {
+            let path = out.path().join(&name);
+            if name.ends_with(".json") {
+                serde_json::from_slice::<Value>(&std::fs::read(&path).unwrap()).unwrap();
+            } else {
+                read_texture(&path).unwrap().check().unwrap();
+            }
+        }
+    }
+}
+
+fn assets() -> Option<PathBuf> {
+    let assets = std::env::var_os("KINRAN_ASSETS").map_or_else(
+        || Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/assets")).to_path_buf(),
+        PathBuf::from,
+    );
+    if assets.is_dir() {
+        return Some(assets);
+    }
+    println!("skipped: {} is absent; set KINRAN_ASSETS", assets.display());
+    None
+}
+
+/// Authored by others; presets and filter are the fastest, the maps are large.
+#[test]
+fn real_materials_do_not_bake() {
+    let Some(assets) = assets() else { return };
+    for name in [
+        "meshes/anisotropy_barn_lamp",
+        "meshes/anisotropy_disc_test",
+        "meshes/horse_statue_01",
+        "materials/acg_metal009",
+        "materials/3dt_fabric_knitted_006",
+    ] {
+        let mut source = assets.join(name);
+        if name.starts_with("meshes") {
+            let model = files(&source).into_iter().find(|f| f.ends_with(".glb") || f.ends_with(".gltf"));
+            source = source.join(model.unwrap_or_else(|| panic!("{name} has no model")));
+        }
+        let out = tempfile::tempdir().unwrap();
+        let fast = ["--filter", "linear", "--preset", "fast", "--zstd", "0"];
+        let said = kinran(&[&["bake", text(&source), "-o", text(out.path())], &fast[..]].concat());
+        assert_eq!(said.code, Some(0), "{name}: {}", said.err);
+        let baked: Vec<String> = files(out.path()).into_iter().filter(|f| f.ends_with(".ktx2")).collect();
+        assert!(baked.len() >= 2, "{name}: {baked:?}");
+        for file in &baked {
+            read_texture(&out.path().join(file)).unwrap().check().unwrap();
+        }
+        for file in files(out.path()).iter().filter(|f| f.ends_with(".png")) {
+            let path = out.path().join(file);
+            decode_image(&path, &std::fs::read(&path).unwrap()).unwrap();
+        }
+    }
+}

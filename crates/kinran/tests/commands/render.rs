@@ -1,0 +1,208 @@
+//! `kinran render` and `kinran compare` on a small model.
+
+use crate::common::{files, kinran, kinran_json, square, text};
+use kinran_image::{Image, Pixels, read_image};
+use kinran_render::metrics::{flip, rmse_srgb8};
+
+fn pixels(image: &Image) -> Vec<[u8; 3]> {
+    let Pixels::U8(samples) = &image.pixels else { panic!("no 8-bit picture") };
+    samples.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
+}
+
+#[test]
+fn the_model_is_in_the_picture_and_shrinks_with_the_square_of_distance() {
+    let (folder, model) = square();
+    let out = folder.path().join("out.png");
+    let covered = |distance: &str| {
+        let said = kinran(&[
+            "render",
+            text(&model),
+            "-o",
+            text(&out),
+            "--size",
+            "96x64",
+            "--spp",
+            "4",
+            "--from",
+            "0,0,1",
+            "--fov",
+            "10",
+            "--background",
+            "0,0,0",
+            "--distance",
+            distance,
+        ]);
+        assert_eq!(said.code, Some(0), "{}", said.err);
+        assert!(said.out.contains("96x64"), "no summary: {}", said.out);
+        let image = read_image(&out).unwrap();
+        assert_eq!((image.width, image.height), (96, 64));
+        pixels(&image).iter().filter(|p| **p != [0; 3]).count() as f32
+    };
+    let (near, far) = (covered("1"), covered("2"));
+    // 5 % of air around a square in a picture 64 pixels high; a border of a pixel may count or not.
+    assert!((near.sqrt() - 64.0 / 1.05).abs() < 3.0, "the square covers {near} pixels");
+    assert!(
+        (near.sqrt() / far.sqrt() - 2.0).abs() < 0.15,
+        "{near} pixels become {far} at twice the distance"
+    );
+}
+
+#[test]
+fn same_bytes_for_one_and_for_three_threads() {
+    let (folder, model) = square();
+    let picture = |threads: &str| {
+        let out = folder.path().join(format!("{threads}.exr"));
+        let said = kinran(&[
+            "render",
+            text(&model),
+            "-o",
+            text(&out),
+            "--size",
+            "40x30",
+            "--spp",
+            "4",
+            "--threads",
+            threads,
+            "--quiet",
+        ]);
+        assert_eq!((said.code, said.out.as_str(), said.err.as_str()), (Some(0), "", ""));
+        std::fs::read(out).unwrap()
+    };
+    assert!(picture("1") == picture("3"), "the pictures differ");
+}
+
+#[test]
+fn one_stop_of_exposure_doubles_light_and_leaves_exr_alone() {
+    let (folder, model) = square();
+    let picture = |exposure: &str, name: &str| {
+        let out = folder.path().join(name);
+        let args = [
+            "render",
+            text(&model),
+            "-o",
+            text(&out),
+            "--size",
+            "24",
+            "--spp",
+            "4",
+            "--tonemap",
+            "none",
+            "--env",
+            "none",
+            "--light",
+            "0,0,1",
+            "--from",
+            "0,0,1",
+            "--exposure",
+            exposure,
+        ];
+        let summary = kinran_json(&args);
+        assert_eq!((summary["width"].as_u64(), summary["triangles"].as_u64()), (Some(24), Some(2)));
+        read_image(&out).unwrap()
+    };
+    let (Pixels::F32(radiance), Pixels::F32(exposed)) =
+        (picture("0", "a.exr").pixels, picture("1", "b.exr").pixels)
+    else {
+        panic!("EXR without floats")
+    };
+    assert!(radiance == exposed, "exposure has changed radiance");
+    assert!(radiance.iter().all(|v| v.is_finite()) && radiance.iter().any(|v| *v > 0.05), "no light");
+    let png = pixels(&picture("1", "c.png"));
+    for (i, (radiance, got)) in radiance.chunks_exact(3).zip(&png).enumerate() {
+        // The sRGB encoding of IEC 61966-2-1.
+        let x = (2.0 * radiance[0]).clamp(0.0, 1.0);
+        let wanted = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+        let off = wanted * 255.0 - f32::from(got[0]);
+        assert!(
+            off.abs() <= 0.51,
+            "pixel {i}: radiance {}, wanted {}, got {}",
+            radiance[0],
+            wanted * 255.0,
+            got[0]
+        );
+    }
+}
+
+#[test]
+fn the_numbers_are_those_of_the_pictures() {
+    let (folder, model) = square();
+    let out = folder.path().join("deep").join("comparison");
+    let report = kinran_json(&[
+        "compare",
+        text(&model),
+        "-o",
+        text(&out),
+        "--size",
+        "48",
+        "--spp",
+        "4",
+        "--truth-spp",
+        "8",
+        "--filters",
+        "ml,naive",
+        "--distances",
+        "1,3",
+    ]);
+    let wanted = [
+        "compare.json",
+        "compare.png",
+        "distance.png",
+        "ml_x1.png",
+        "ml_x3.png",
+        "naive_x1.png",
+        "naive_x3.png",
+        "truth_x1.png",
+        "truth_x3.png",
+    ];
+    assert_eq!(files(&out), wanted);
+    let stored: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("compare.json")).unwrap()).unwrap();
+    assert_eq!(stored, report);
+
+    let load = |name: String| read_image(&out.join(name)).unwrap();
+    for method in report["methods"].as_array().unwrap() {
+        let filter = method["filter"].as_str().unwrap();
+        for (number, side) in method["distances"].as_array().unwrap().iter().zip([48, 16]) {
+            let distance = number["distance"].as_f64().unwrap();
+            let (truth, picture) =
+                (load(format!("truth_x{distance}.png")), load(format!("{filter}_x{distance}.png")));
+            assert_eq!((picture.width, picture.height), (side, side), "{filter} x{distance}");
+            let (truth, picture) = (pixels(&truth), pixels(&picture));
+            let rmse = rmse_srgb8(&truth, &picture).unwrap();
+            let flip = f64::from(flip(&truth, &picture, side, side).unwrap().mean);
+            for (what, wanted) in [("rmse", rmse), ("flip", flip)] {
+                let got = number[what].as_f64().unwrap();
+                assert!(
+                    (got - wanted).abs() < 1e-6,
+                    "{filter} x{distance} {what}: wanted {wanted}, got {got}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn from_afar_naive_mips_are_farther_from_the_truth_than_fitted_ones() {
+    let (folder, model) = square();
+    let out = folder.path().join("out");
+    let report = kinran_json(&[
+        "compare",
+        text(&model),
+        "-o",
+        text(&out),
+        "--size",
+        "64",
+        "--spp",
+        "64",
+        "--truth-spp",
+        "256",
+        "--filters",
+        "ml,naive",
+        "--distances",
+        "4",
+        "--from",
+        "0,0,1",
+    ]);
+    let error = |i: usize| report["methods"][i]["distances"][0]["rmse"].as_f64().unwrap();
+    assert!(error(0) < 0.5 * error(1), "ml is off by {}, naive by {}", error(0), error(1));
+}
