@@ -1,0 +1,1 @@
+//! The formulas of `kinran-shading` as shader text, without a GPU API.
