@@ -1,50 +1,90 @@
-//! Takes the text that a naga back end wrote apart into its top-level declarations.
+//! A translated text taken apart at its top-level declarations.
 
-/// A top-level declaration of GLSL, HLSL or MSL.
-pub struct Declaration {
-    /// What it declares; empty for directives such as `#include` and `using`.
-    pub name: String,
-    /// Its text, without blank lines around it.
-    pub text: String,
+use std::collections::BTreeSet;
+
+use crate::{Error, source::words};
+
+/// A declaration as naga wrote it.
+pub(crate) struct Chunk {
+    /// What it declares.
+    pub(crate) name: String,
+    /// Its text, each line ended.
+    pub(crate) text: String,
 }
 
-/// The name that a declaration's text declares.
-fn name_of(text: &str) -> String {
-    let word = |s: &str| {
-        s.trim_end().rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default().to_owned()
-    };
-    let head = text.split(['{', '=', ';']).next().unwrap_or_default();
-    if text.starts_with('#') || text.starts_with("using ") || text.starts_with("precision ") {
-        String::new()
-    } else if text.starts_with("typedef ") {
-        // `typedef float ret_Construct[9];`, and naga's `typedef float ret_Construct(...)`.
-        word(head.split('[').next().unwrap_or_default())
-    } else if text.starts_with("struct ") || !head.contains('(') {
-        word(head.split('[').next().unwrap_or_default())
-    } else {
-        word(head.split('(').next().unwrap_or_default())
-    }
-}
-
-/// The declarations of `text` in order. A declaration ends with a brace that closes at the top level, a semicolon
-/// there, or, for a directive, with its line.
-pub fn declarations(text: &str) -> Vec<Declaration> {
-    let mut found = Vec::new();
-    let mut current = String::new();
-    let mut depth = 0_usize;
+/// All declarations of a text in GLSL, HLSL or MSL, in order. Directives and `using` lines are left out.
+pub(crate) fn split(text: &str) -> Result<Vec<Chunk>, Error> {
+    let mut chunks = Vec::new();
+    let mut open = String::new();
     for line in text.lines() {
-        if line.trim().is_empty() && depth == 0 {
+        let between = open.is_empty();
+        let is_directive =
+            line.starts_with('#') || line.starts_with("using ") || line.starts_with("precision ");
+        if between && (line.trim().is_empty() || line.starts_with("//") || is_directive) {
             continue;
         }
-        current += line;
-        current.push('\n');
-        depth += line.matches('{').count();
-        depth -= line.matches('}').count();
-        let ends = line.starts_with('#') || line.trim_end().ends_with([';', '}']);
-        if depth == 0 && ends {
-            let text = std::mem::take(&mut current).trim_end().to_owned();
-            found.push(Declaration { name: name_of(&text), text });
+        open += &format!("{}\n", line.trim_end());
+        let depth = open.matches('{').count().checked_sub(open.matches('}').count());
+        if depth.ok_or("a brace too many")? == 0 && line.trim_end().ends_with(['}', ';']) {
+            let text = std::mem::take(&mut open);
+            chunks.push(Chunk { name: declared(&text)?.to_owned(), text });
         }
     }
-    found
+    if open.is_empty() { Ok(chunks) } else { Err(format!("a declaration has no end: {open}").into()) }
+}
+
+/// The name a declaration declares: after `struct`, before the parameters of a function, before the `=` of a
+/// constant, or last in a `typedef`.
+fn declared(text: &str) -> Result<&str, Error> {
+    let head = text.split(['(', '=', '{', ';']).next().unwrap_or_default();
+    let head = head.split_once("struct ").map_or(head, |(_, after)| after);
+    // float name[9]
+    let head = if text.contains('(') && !text.starts_with("typedef") {
+        head
+    } else {
+        head.split('[').next().unwrap_or_default()
+    };
+    words(head).last().ok_or_else(|| format!("what does this declare? {text}").into())
+}
+
+/// naga numbers the parameters and variables of all functions together: `h`, `h_1`, `h_2`. In each chunk, takes the
+/// number off where that leaves one thing of the name.
+pub(crate) fn unnumber(chunks: &mut [Chunk]) {
+    let everywhere: BTreeSet<String> =
+        chunks.iter().flat_map(|c| words(&c.text)).map(str::to_owned).collect();
+    let globals: BTreeSet<String> = chunks.iter().map(|c| c.name.clone()).collect();
+    for chunk in chunks {
+        let here: BTreeSet<String> = words(&chunk.text).map(str::to_owned).collect();
+        let base = |word: &str| {
+            let (base, number) = word.rsplit_once('_')?;
+            (!number.is_empty() && number.bytes().all(|b| b.is_ascii_digit())).then(|| base.to_owned())
+        };
+        let is_free = |word: &String| {
+            base(word).is_some_and(|base_of_word| {
+                // Where the first of a name is `name_`, `name` is a word of the language.
+                everywhere.contains(&base_of_word)
+                    && !everywhere.contains(&format!("{base_of_word}_"))
+                    && !here.contains(&base_of_word)
+                    && !globals.contains(&base_of_word)
+                    && here.iter().filter(|other| base(other).as_ref() == Some(&base_of_word)).count() == 1
+            })
+        };
+        for word in here.iter().filter(|word| !globals.contains(*word) && is_free(word)) {
+            chunk.text = replace_word(&chunk.text, word, &base(word).unwrap_or_default());
+        }
+    }
+}
+
+fn replace_word(text: &str, from: &str, to: &str) -> String {
+    let is_part = |c: char| c.is_alphanumeric() || c == '_';
+    let mut replaced = String::new();
+    let mut rest = text;
+    while let Some(at) = rest.find(from) {
+        let (before, after) = (&rest[..at], &rest[at + from.len()..]);
+        let is_whole = !before.ends_with(is_part) && !after.starts_with(is_part);
+        replaced += before;
+        replaced += if is_whole { to } else { from };
+        rest = after;
+    }
+    replaced + rest
 }

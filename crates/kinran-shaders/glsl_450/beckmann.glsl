@@ -1,0 +1,46 @@
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/beckmann.wesl, by ./x shaders. Needs: nothing else
+
+// The Beckmann distribution and LEAN mapping, to compare with.
+//
+// Beckmann, Spizzichino. The Scattering of Electromagnetic Waves from Rough Surfaces. 1963.
+// Olano, Baker. LEAN Mapping. I3D 2010.
+
+#ifndef KINRAN_BECKMANN_GLSL
+#define KINRAN_BECKMANN_GLSL
+
+/// Beckmann's sigma, the standard deviation of slopes, that stands for a GGX alpha (slide: LEAN Mapping):
+/// `alpha / sqrt(2)`.
+float sigma_from_alpha(float alpha) {
+    return (alpha * 0.70710677);
+}
+
+/// The inverse of `sigma_from_alpha`.
+float alpha_from_sigma(float sigma) {
+    return (sigma * 1.4142135);
+}
+
+/// Distribution of microfacet normals per steradian with slope deviations `sigma_t`, `sigma_b` along x and y
+/// (Beckmann 1963): `exp(-(x²/σt² + y²/σb²) / (2 z²)) / (2π σt σb z⁴)`, zero below the horizon.
+float beckmann_aniso_d(vec3 h, float sigma_t, float sigma_b) {
+    if ((h.z <= 1e-6)) {
+        return 0.0;
+    }
+    float z_sqr = (h.z * h.z);
+    float x_1 = (h.x / sigma_t);
+    float y_1 = (h.y / sigma_b);
+    return (exp(((-0.5 * ((x_1 * x_1) + (y_1 * y_1))) / z_sqr)) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr));
+}
+
+/// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
+vec2 slope_from_normal(vec3 n) {
+    return (n.xy / vec2(n.z));
+}
+
+/// Unit normal of a slope.
+vec3 normal_from_slope(vec2 slope) {
+    return (vec3(slope, 1.0) * inversesqrt((1.0 + dot(slope, slope))));
+}
+
+#endif

@@ -1,0 +1,153 @@
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/aniso.wesl, by ./x shaders. Needs: frame, sym
+
+// The aniso texel: squared roughness as three numbers that survive 8 bits, filtering and BC7.
+//
+// A texel holds [sqrt(Sxx), rho/2 + 1/2, sqrt(Syy)] with rho = Sxy / sqrt(Sxx Syy) (slide: Our Algorithm, step 4).
+// S is alpha² as a symmetric matrix in the frame of `m_n`. Sample the texture with the hardware's filter; every
+// average of texels decodes to a positive semi-definite matrix.
+
+#ifndef KINRAN_ANISO_METAL
+#define KINRAN_ANISO_METAL
+
+#include <metal_stdlib>
+
+#include "frame.h"
+#include "sym.h"
+
+/// What a light needs of an aniso texel.
+struct AnisoDecoded {
+    float alpha_t;
+    float alpha_b;
+    char _pad2[8];
+    metal::float3 tangent;
+    metal::float3 bitangent;
+};
+
+/// Smallest GGX roughness to shade with: one step of an 8-bit aniso channel.
+constant float ALPHA_MIN = 0.003921569;
+
+/// GGX alpha of a perceptual roughness in [0, 1]: its square, at least ALPHA_MIN.
+inline float alpha_from_roughness(
+    float roughness
+) {
+    return metal::max(roughness * roughness, ALPHA_MIN);
+}
+
+/// GGX alpha of a gloss in [0, 1]: `(1 - gloss)²`, at least ALPHA_MIN.
+inline float alpha_from_gloss(
+    float gloss
+) {
+    float _e3 = alpha_from_roughness(1.0 - gloss);
+    return _e3;
+}
+
+/// Texel of a squared roughness matrix `s` (xx, xy, yy); each component in [0, 1]. rho is 0 where Sxx or Syy is 0.
+inline metal::float3 aniso_encode(
+    metal::float3 s
+) {
+    float product = s.x * s.z;
+    float rho = (product > 0.0) ? metal::clamp(s.y * metal::rsqrt(product), -1.0, 1.0) : 0.0;
+    return metal::float3(metal::sqrt(metal::saturate(s.x)), (0.5 * rho) + 0.5, metal::sqrt(metal::saturate(s.z)));
+}
+
+/// Squared roughness matrix (xx, xy, yy) of a texel: positive semi-definite for every texel in [0, 1]³.
+///
+/// With `ggx_matrix_d` and `smith_matrix_v` this is all the decoding a light needs: cheaper than `aniso_decode` for a
+/// few lights. Add `sym2_clamp_eigen` where a determinant of zero would divide.
+inline metal::float3 aniso_decode_matrix(
+    metal::float3 texel
+) {
+    return metal::float3(texel.x * texel.x, (texel.x * ((texel.y * 2.0) - 1.0)) * texel.z, texel.z * texel.z);
+}
+
+/// Principal roughnesses and directions of a texel (slide: Our Algorithm, `DecodeSggx`), in the frame of the two unit
+/// vectors given, which are the first two columns of `m_n` brought to world space.
+///
+/// Differs from the slide in two points. alpha_b is `sqrt(det) / alpha_t` with `det = Sxx Syy (1 - rho²)`, where the
+/// slide's half difference cancels. And Sxy = 0 counts as positive: with HLSL's `sign`, which is zero there, the
+/// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
+/// 0.03° of the exact one.
+inline AnisoDecoded aniso_decode(
+    metal::float3 texel,
+    metal::float3 tangent,
+    metal::float3 bitangent
+) {
+    float rho = (texel.y * 2.0) - 1.0;
+    float product = texel.x * texel.z;
+    float sxy = product * rho;
+    float sxx = (texel.x * texel.x) + 0.000000000001;
+    float syy = texel.z * texel.z;
+    float difference = sxx - syy;
+    float discr_sqr = (difference * difference) + ((4.0 * sxy) * sxy);
+    float discr_rcp = metal::rsqrt(discr_sqr);
+    float alpha_t_sqr = 0.5 * ((sxx + syy) + (discr_sqr * discr_rcp));
+    float alpha_t_rcp = metal::rsqrt(alpha_t_sqr);
+    float alpha_t = alpha_t_sqr * alpha_t_rcp;
+    float alpha_b = (product * metal::sqrt(1.0 - (rho * rho))) * alpha_t_rcp;
+    float c_sqr = metal::saturate(((0.5 * difference) * discr_rcp) + 0.5);
+    float c = metal::sqrt(c_sqr);
+    float s_abs = metal::sqrt(1.0 - c_sqr);
+    float s = (sxy < 0.0) ? -(s_abs) : s_abs;
+    return AnisoDecoded {metal::clamp(alpha_t, ALPHA_MIN, 1.0), metal::clamp(alpha_b, ALPHA_MIN, 1.0), {}, (c * tangent) + (s * bitangent), (c * bitangent) - (s * tangent)};
+}
+
+/// Squared roughness matrix (xx, xy, yy) with `alpha_t` along the unit vector `axis` of the `m_n` frame, `alpha_b`
+/// across.
+inline metal::float3 aniso_from_alphas(
+    float alpha_t,
+    float alpha_b,
+    metal::float2 axis
+) {
+    metal::float3 _e5 = sym2_from_eigen(alpha_t * alpha_t, alpha_b * alpha_b, axis);
+    return _e5;
+}
+
+/// Direction in the `m_n` frame of a direction painted in the mesh's tangent plane: what Gram–Schmidt, `d - (d·n) n`,
+/// makes of it. Both are unit vectors; where nothing is left of it, the direction stays as it is.
+inline metal::float2 axis_from_direction(
+    metal::float2 direction,
+    metal::float3 n
+) {
+    metal::float3x3 _e2 = m_n(n);
+    metal::float2 axis = metal::float2(metal::dot(_e2[0].xy, direction), metal::dot(_e2[1].xy, direction));
+    float length_squared = metal::dot(axis, axis);
+    return (length_squared > 0.000000000001) ? (axis * metal::rsqrt(length_squared)) : direction;
+}
+
+/// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
+/// turns into `axis` of the `m_n` frame.
+inline metal::float2 direction_from_axis(
+    metal::float2 axis,
+    metal::float3 n
+) {
+    metal::float3x3 _e2 = m_n(n);
+    metal::float3 t = (_e2[0] * axis.x) + (_e2[1] * axis.y);
+    metal::float2 d = (t.xy * n.z) - (t.z * n.xy);
+    float length_squared = metal::dot(d, d);
+    return (length_squared > 0.000000000001) ? (d * metal::rsqrt(length_squared)) : axis;
+}
+
+/// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
+/// `alpha_t = mix(alpha_b, 1, strength²)`.
+inline metal::float2 alphas_from_khr_anisotropy(
+    float roughness,
+    float strength
+) {
+    float _e2 = alpha_from_roughness(roughness);
+    return metal::float2(_e2 + (((1.0 - _e2) * strength) * strength), _e2);
+}
+
+/// Perceptual roughness and anisotropy strength of `KHR_materials_anisotropy` for `alpha_t ≥ alpha_b`; the inverse of
+/// `alphas_from_khr_anisotropy`.
+inline metal::float2 khr_anisotropy_from_alphas(
+    float alpha_t,
+    float alpha_b
+) {
+    float rest = 1.0 - alpha_b;
+    float strength = (rest > 0.0) ? metal::sqrt(metal::saturate((alpha_t - alpha_b) / rest)) : 0.0;
+    return metal::float2(metal::sqrt(alpha_b), strength);
+}
+
+#endif

@@ -1,0 +1,262 @@
+//! The texts. Written by ./x shaders.
+
+/// WESL, the sources.
+pub mod wesl {
+    use crate::Module;
+
+    /// The module `beckmann`.
+    pub const BECKMANN: &str = include_str!("../src/beckmann.wesl");
+
+    /// The module `frame`.
+    pub const FRAME: &str = include_str!("../src/frame.wesl");
+
+    /// The module `multiscatter`.
+    pub const MULTISCATTER: &str = include_str!("../src/multiscatter.wesl");
+
+    /// The module `sh`.
+    pub const SH: &str = include_str!("../src/sh.wesl");
+
+    /// The module `sym`.
+    pub const SYM: &str = include_str!("../src/sym.wesl");
+
+    /// The module `aniso`.
+    pub const ANISO: &str = include_str!("../src/aniso.wesl");
+
+    /// The module `ggx`.
+    pub const GGX: &str = include_str!("../src/ggx.wesl");
+
+    /// The module `sggx`.
+    pub const SGGX: &str = include_str!("../src/sggx.wesl");
+
+    /// The modules, each after those it needs.
+    pub const MODULES: &[Module] = &[
+        Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
+        Module { name: "sh", text: SH, needs: &[] },
+        Module { name: "sym", text: SYM, needs: &[] },
+        Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+    ];
+}
+
+/// WGSL.
+pub mod wgsl {
+    use crate::Module;
+
+    /// The module `beckmann`.
+    pub const BECKMANN: &str = include_str!("../wgsl/beckmann.wgsl");
+
+    /// The module `frame`.
+    pub const FRAME: &str = include_str!("../wgsl/frame.wgsl");
+
+    /// The module `multiscatter`.
+    pub const MULTISCATTER: &str = include_str!("../wgsl/multiscatter.wgsl");
+
+    /// The module `sh`.
+    pub const SH: &str = include_str!("../wgsl/sh.wgsl");
+
+    /// The module `sym`.
+    pub const SYM: &str = include_str!("../wgsl/sym.wgsl");
+
+    /// The module `aniso`.
+    pub const ANISO: &str = include_str!("../wgsl/aniso.wgsl");
+
+    /// The module `ggx`.
+    pub const GGX: &str = include_str!("../wgsl/ggx.wgsl");
+
+    /// The module `sggx`.
+    pub const SGGX: &str = include_str!("../wgsl/sggx.wgsl");
+
+    /// All modules in one text.
+    pub const ALL: &str = include_str!("../wgsl/kinran.wgsl");
+
+    /// The modules, each after those it needs.
+    pub const MODULES: &[Module] = &[
+        Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
+        Module { name: "sh", text: SH, needs: &[] },
+        Module { name: "sym", text: SYM, needs: &[] },
+        Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+    ];
+}
+
+/// GLSL 4.50.
+pub mod glsl_450 {
+    use crate::Module;
+
+    /// The module `beckmann`.
+    pub const BECKMANN: &str = include_str!("../glsl_450/beckmann.glsl");
+
+    /// The module `frame`.
+    pub const FRAME: &str = include_str!("../glsl_450/frame.glsl");
+
+    /// The module `multiscatter`.
+    pub const MULTISCATTER: &str = include_str!("../glsl_450/multiscatter.glsl");
+
+    /// The module `sh`.
+    pub const SH: &str = include_str!("../glsl_450/sh.glsl");
+
+    /// The module `sym`.
+    pub const SYM: &str = include_str!("../glsl_450/sym.glsl");
+
+    /// The module `aniso`.
+    pub const ANISO: &str = include_str!("../glsl_450/aniso.glsl");
+
+    /// The module `ggx`.
+    pub const GGX: &str = include_str!("../glsl_450/ggx.glsl");
+
+    /// The module `sggx`.
+    pub const SGGX: &str = include_str!("../glsl_450/sggx.glsl");
+
+    /// All modules in one text.
+    pub const ALL: &str = include_str!("../glsl_450/kinran.glsl");
+
+    /// The modules, each after those it needs.
+    pub const MODULES: &[Module] = &[
+        Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
+        Module { name: "sh", text: SH, needs: &[] },
+        Module { name: "sym", text: SYM, needs: &[] },
+        Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+    ];
+}
+
+/// GLSL ES 3.00.
+pub mod glsl_es_300 {
+    use crate::Module;
+
+    /// The module `beckmann`.
+    pub const BECKMANN: &str = include_str!("../glsl_es_300/beckmann.glsl");
+
+    /// The module `frame`.
+    pub const FRAME: &str = include_str!("../glsl_es_300/frame.glsl");
+
+    /// The module `multiscatter`.
+    pub const MULTISCATTER: &str = include_str!("../glsl_es_300/multiscatter.glsl");
+
+    /// The module `sh`.
+    pub const SH: &str = include_str!("../glsl_es_300/sh.glsl");
+
+    /// The module `sym`.
+    pub const SYM: &str = include_str!("../glsl_es_300/sym.glsl");
+
+    /// The module `aniso`.
+    pub const ANISO: &str = include_str!("../glsl_es_300/aniso.glsl");
+
+    /// The module `ggx`.
+    pub const GGX: &str = include_str!("../glsl_es_300/ggx.glsl");
+
+    /// The module `sggx`.
+    pub const SGGX: &str = include_str!("../glsl_es_300/sggx.glsl");
+
+    /// All modules in one text.
+    pub const ALL: &str = include_str!("../glsl_es_300/kinran.glsl");
+
+    /// The modules, each after those it needs.
+    pub const MODULES: &[Module] = &[
+        Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
+        Module { name: "sh", text: SH, needs: &[] },
+        Module { name: "sym", text: SYM, needs: &[] },
+        Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+    ];
+}
+
+/// HLSL.
+pub mod hlsl {
+    use crate::Module;
+
+    /// The module `beckmann`.
+    pub const BECKMANN: &str = include_str!("../hlsl/beckmann.hlsl");
+
+    /// The module `frame`.
+    pub const FRAME: &str = include_str!("../hlsl/frame.hlsl");
+
+    /// The module `multiscatter`.
+    pub const MULTISCATTER: &str = include_str!("../hlsl/multiscatter.hlsl");
+
+    /// The module `sh`.
+    pub const SH: &str = include_str!("../hlsl/sh.hlsl");
+
+    /// The module `sym`.
+    pub const SYM: &str = include_str!("../hlsl/sym.hlsl");
+
+    /// The module `aniso`.
+    pub const ANISO: &str = include_str!("../hlsl/aniso.hlsl");
+
+    /// The module `ggx`.
+    pub const GGX: &str = include_str!("../hlsl/ggx.hlsl");
+
+    /// The module `sggx`.
+    pub const SGGX: &str = include_str!("../hlsl/sggx.hlsl");
+
+    /// All modules in one text.
+    pub const ALL: &str = include_str!("../hlsl/kinran.hlsl");
+
+    /// The modules, each after those it needs.
+    pub const MODULES: &[Module] = &[
+        Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
+        Module { name: "sh", text: SH, needs: &[] },
+        Module { name: "sym", text: SYM, needs: &[] },
+        Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+    ];
+}
+
+/// MSL.
+pub mod msl {
+    use crate::Module;
+
+    /// The module `beckmann`.
+    pub const BECKMANN: &str = include_str!("../msl/beckmann.h");
+
+    /// The module `frame`.
+    pub const FRAME: &str = include_str!("../msl/frame.h");
+
+    /// The module `multiscatter`.
+    pub const MULTISCATTER: &str = include_str!("../msl/multiscatter.h");
+
+    /// The module `sh`.
+    pub const SH: &str = include_str!("../msl/sh.h");
+
+    /// The module `sym`.
+    pub const SYM: &str = include_str!("../msl/sym.h");
+
+    /// The module `aniso`.
+    pub const ANISO: &str = include_str!("../msl/aniso.h");
+
+    /// The module `ggx`.
+    pub const GGX: &str = include_str!("../msl/ggx.h");
+
+    /// The module `sggx`.
+    pub const SGGX: &str = include_str!("../msl/sggx.h");
+
+    /// All modules in one text.
+    pub const ALL: &str = include_str!("../msl/kinran.h");
+
+    /// The modules, each after those it needs.
+    pub const MODULES: &[Module] = &[
+        Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
+        Module { name: "sh", text: SH, needs: &[] },
+        Module { name: "sym", text: SYM, needs: &[] },
+        Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+    ];
+}

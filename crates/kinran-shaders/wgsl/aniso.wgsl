@@ -1,0 +1,126 @@
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/aniso.wesl, by ./x shaders. Needs: frame, sym
+
+// The aniso texel: squared roughness as three numbers that survive 8 bits, filtering and BC7.
+//
+// A texel holds [sqrt(Sxx), rho/2 + 1/2, sqrt(Syy)] with rho = Sxy / sqrt(Sxx Syy) (slide: Our Algorithm, step 4).
+// S is alpha² as a symmetric matrix in the frame of `m_n`. Sample the texture with the hardware's filter; every
+// average of texels decodes to a positive semi-definite matrix.
+
+/// Smallest GGX roughness to shade with: one step of an 8-bit aniso channel.
+const ALPHA_MIN: f32 = 0.00392156862745098;
+
+/// GGX alpha of a perceptual roughness in [0, 1]: its square, at least ALPHA_MIN.
+fn alpha_from_roughness(roughness: f32) -> f32 {
+    return max(roughness * roughness, ALPHA_MIN);
+}
+
+/// GGX alpha of a gloss in [0, 1]: `(1 - gloss)²`, at least ALPHA_MIN.
+fn alpha_from_gloss(gloss: f32) -> f32 {
+    return alpha_from_roughness(1.0 - gloss);
+}
+
+/// What a light needs of an aniso texel.
+struct AnisoDecoded {
+    /// Roughness along `tangent`, the larger one.
+    alpha_t: f32,
+    /// Roughness along `bitangent`, the smaller one.
+    alpha_b: f32,
+    /// Unit vector of the larger roughness.
+    tangent: vec3f,
+    /// Unit vector of the smaller roughness.
+    bitangent: vec3f,
+}
+
+/// Texel of a squared roughness matrix `s` (xx, xy, yy); each component in [0, 1]. rho is 0 where Sxx or Syy is 0.
+fn aniso_encode(s: vec3f) -> vec3f {
+    let product = s.x * s.z;
+    let rho = select(0.0, clamp(s.y * inverseSqrt(product), -1.0, 1.0), product > 0.0);
+    return vec3f(sqrt(saturate(s.x)), 0.5 * rho + 0.5, sqrt(saturate(s.z)));
+}
+
+/// Squared roughness matrix (xx, xy, yy) of a texel: positive semi-definite for every texel in [0, 1]³.
+///
+/// With `ggx_matrix_d` and `smith_matrix_v` this is all the decoding a light needs: cheaper than `aniso_decode` for a
+/// few lights. Add `sym2_clamp_eigen` where a determinant of zero would divide.
+fn aniso_decode_matrix(texel: vec3f) -> vec3f {
+    return vec3f(texel.x * texel.x, texel.x * (texel.y * 2.0 - 1.0) * texel.z, texel.z * texel.z);
+}
+
+/// Principal roughnesses and directions of a texel (slide: Our Algorithm, `DecodeSggx`), in the frame of the two unit
+/// vectors given, which are the first two columns of `m_n` brought to world space.
+///
+/// Differs from the slide in two points. alpha_b is `sqrt(det) / alpha_t` with `det = Sxx Syy (1 - rho²)`, where the
+/// slide's half difference cancels. And Sxy = 0 counts as positive: with HLSL's `sign`, which is zero there, the
+/// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
+/// 0.03° of the exact one.
+fn aniso_decode(texel: vec3f, tangent: vec3f, bitangent: vec3f) -> AnisoDecoded {
+    let rho = texel.y * 2.0 - 1.0;
+    let product = texel.x * texel.z;
+    let sxy = product * rho;
+    // The grain of 1e-12 gives a round lobe the axis (1, 0) and touches no other.
+    let sxx = texel.x * texel.x + 1e-12;
+    let syy = texel.z * texel.z;
+    let difference = sxx - syy;
+    let discr_sqr = difference * difference + 4.0 * sxy * sxy;
+    let discr_rcp = inverseSqrt(discr_sqr);
+
+    let alpha_t_sqr = 0.5 * (sxx + syy + discr_sqr * discr_rcp);
+    let alpha_t_rcp = inverseSqrt(alpha_t_sqr);
+    let alpha_t = alpha_t_sqr * alpha_t_rcp;
+    let alpha_b = product * sqrt(1.0 - rho * rho) * alpha_t_rcp;
+
+    let c_sqr = saturate(0.5 * difference * discr_rcp + 0.5);
+    let c = sqrt(c_sqr);
+    let s_abs = sqrt(1.0 - c_sqr);
+    let s = select(s_abs, -s_abs, sxy < 0.0);
+    return AnisoDecoded(
+        clamp(alpha_t, ALPHA_MIN, 1.0),
+        clamp(alpha_b, ALPHA_MIN, 1.0),
+        c * tangent + s * bitangent,
+        c * bitangent - s * tangent,
+    );
+}
+
+/// Squared roughness matrix (xx, xy, yy) with `alpha_t` along the unit vector `axis` of the `m_n` frame, `alpha_b`
+/// across.
+fn aniso_from_alphas(alpha_t: f32, alpha_b: f32, axis: vec2f) -> vec3f {
+    return sym2_from_eigen(alpha_t * alpha_t, alpha_b * alpha_b, axis);
+}
+
+/// Direction in the `m_n` frame of a direction painted in the mesh's tangent plane: what Gram–Schmidt, `d - (d·n) n`,
+/// makes of it. Both are unit vectors; where nothing is left of it, the direction stays as it is.
+fn axis_from_direction(direction: vec2f, n: vec3f) -> vec2f {
+    // The columns of m_n are orthogonal to n, so the Gram–Schmidt term drops out of both products.
+    let m = m_n(n);
+    let axis = vec2f(dot(m[0].xy, direction), dot(m[1].xy, direction));
+    let length_squared = dot(axis, axis);
+    return select(direction, axis * inverseSqrt(length_squared), length_squared > 1e-12);
+}
+
+/// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
+/// turns into `axis` of the `m_n` frame.
+fn direction_from_axis(axis: vec2f, n: vec3f) -> vec2f {
+    let m = m_n(n);
+    let t = m[0] * axis.x + m[1] * axis.y;
+    // In the plane of t and n, the vector without a z component; times n.z to survive the horizon.
+    let d = t.xy * n.z - t.z * n.xy;
+    let length_squared = dot(d, d);
+    return select(axis, d * inverseSqrt(length_squared), length_squared > 1e-12);
+}
+
+/// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
+/// `alpha_t = mix(alpha_b, 1, strength²)`.
+fn alphas_from_khr_anisotropy(roughness: f32, strength: f32) -> vec2f {
+    let alpha_b = alpha_from_roughness(roughness);
+    return vec2f(alpha_b + (1.0 - alpha_b) * strength * strength, alpha_b);
+}
+
+/// Perceptual roughness and anisotropy strength of `KHR_materials_anisotropy` for `alpha_t ≥ alpha_b`; the inverse of
+/// `alphas_from_khr_anisotropy`.
+fn khr_anisotropy_from_alphas(alpha_t: f32, alpha_b: f32) -> vec2f {
+    let rest = 1.0 - alpha_b;
+    let strength = select(0.0, sqrt(saturate((alpha_t - alpha_b) / rest)), rest > 0.0);
+    return vec2f(sqrt(alpha_b), strength);
+}

@@ -1,0 +1,677 @@
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/beckmann.wesl, by ./x shaders. Needs: nothing else
+
+// The Beckmann distribution and LEAN mapping, to compare with.
+//
+// Beckmann, Spizzichino. The Scattering of Electromagnetic Waves from Rough Surfaces. 1963.
+// Olano, Baker. LEAN Mapping. I3D 2010.
+
+/// Beckmann's sigma, the standard deviation of slopes, that stands for a GGX alpha (slide: LEAN Mapping):
+/// `alpha / sqrt(2)`.
+fn sigma_from_alpha(alpha: f32) -> f32 {
+    return alpha * 0.70710678;
+}
+
+/// The inverse of `sigma_from_alpha`.
+fn alpha_from_sigma(sigma: f32) -> f32 {
+    return sigma * 1.41421356;
+}
+
+/// Distribution of microfacet normals per steradian with slope deviations `sigma_t`, `sigma_b` along x and y
+/// (Beckmann 1963): `exp(-(x²/σt² + y²/σb²) / (2 z²)) / (2π σt σb z⁴)`, zero below the horizon.
+fn beckmann_aniso_d(h: vec3f, sigma_t: f32, sigma_b: f32) -> f32 {
+    // z⁴ underflows long after the exponential has: at z = 1e-6 it is exp(-5e11 / sigma²).
+    if h.z <= 1e-6 {
+        return 0.0;
+    }
+    let z_sqr = h.z * h.z;
+    let x = h.x / sigma_t;
+    let y = h.y / sigma_b;
+    return exp(-0.5 * (x * x + y * y) / z_sqr) / (6.2831853 * sigma_t * sigma_b * z_sqr * z_sqr);
+}
+
+/// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
+fn slope_from_normal(n: vec3f) -> vec2f {
+    return n.xy / n.z;
+}
+
+/// Unit normal of a slope.
+fn normal_from_slope(slope: vec2f) -> vec3f {
+    return vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/frame.wesl, by ./x shaders. Needs: nothing else
+
+// The frame in which an anisotropic texel lives.
+
+/// The shortest-arc rotation that takes z = (0, 0, 1) to the unit vector `n` (slide: Our Algorithm, step 1).
+///
+/// Its first two columns are the tangent and bitangent of every aniso texel; a Gram–Schmidt tangent differs from them
+/// by 0.44° at a tilt of 10° and 18° at 60°, so decode with these. Orthonormal to 3e-7 for n.z ≥ 0; where `1 + n.z`
+/// is below 1e-6 the half turn about x is returned, whose third column is −z.
+fn m_n(n: vec3f) -> mat3x3f {
+    let d = 1.0 + n.z;
+    if d < 1e-6 {
+        return mat3x3f(vec3f(1.0, 0.0, 0.0), vec3f(0.0, -1.0, 0.0), vec3f(0.0, 0.0, -1.0));
+    }
+    let a = 1.0 / d;
+    let xy = -n.x * n.y * a;
+    return mat3x3f(vec3f(n.z + n.y * n.y * a, xy, -n.x), vec3f(xy, n.z + n.x * n.x * a, -n.y), n);
+}
+
+/// A unit normal from the xy of a normal map, each in [−1, 1]. Where x² + y² exceeds one, as compression and
+/// filtering make it do, the normal lies on the horizon in the same direction.
+fn normal_from_xy(x: f32, y: f32) -> vec3f {
+    let xy_squared = x * x + y * y;
+    let scale = inverseSqrt(max(xy_squared, 1.0));
+    return vec3f(x * scale, y * scale, sqrt(max(1.0 - xy_squared, 0.0)));
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/multiscatter.wesl, by ./x shaders. Needs: nothing else
+
+// Energy that microfacet models lose between the facets, given back.
+//
+// Turquin. Practical multiple scattering compensation for microfacet models. 2019.
+
+/// Directional albedo of the single-scattering GGX lobe with height-correlated Smith masking and F = 1, for a view at
+/// cosine `n_v` (0 to 1): the share of a white furnace that comes back, 0.307 (= 1 − ln 2) to 1. A rational fit,
+/// within 0.011 of quadrature (0.004 RMS) for alpha and n_v in [0.005, 1]; it takes the place of a lookup table.
+fn ggx_directional_albedo(n_v: f32, alpha: f32) -> f32 {
+    let m = n_v;
+    let a = alpha;
+    let m_sqr = m * m;
+    let a_sqr = a * a;
+    let p = (0.00023917 + 0.004272 * a + 0.014007 * a_sqr)
+        + (0.13020 - 0.075028 * a + 3.2169 * a_sqr) * m
+        + (-0.034490 - 0.18897 * a + 0.089879 * a_sqr) * m_sqr;
+    let q = (-0.000019263 + 0.0054598 * a + 1.0288 * a_sqr)
+        + (0.0019317 - 1.1331 * a + 5.3123 * a_sqr) * m
+        + (1.0 - 1.3516 * a - 0.38030 * a_sqr) * m_sqr;
+    return clamp(1.0 - a * p / q, 0.3, 1.0);
+}
+
+/// Factor on the single-scattering lobe that restores the energy of all further bounces, `1 + f0 (1/E - 1)` (Turquin
+/// 2019, eq. 16), per pixel. The factor depends on the view alone, so the compensated lobe is not reciprocal. An
+/// anisotropic lobe uses the isotropic albedo at `alpha = sqrt((alpha_t² + alpha_b²)/2)`.
+fn multiscatter_compensation(f0: vec3f, n_v: f32, alpha_t: f32, alpha_b: f32) -> vec3f {
+    let alpha = sqrt(0.5 * (alpha_t * alpha_t + alpha_b * alpha_b));
+    let e = ggx_directional_albedo(saturate(n_v), alpha);
+    return 1.0 + f0 * (1.0 / e - 1.0);
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/sh.wesl, by ./x shaders. Needs: nothing else
+
+// Order-2 spherical harmonics: distant light by nine coefficients.
+//
+// Ramamoorthi and Hanrahan. An Efficient Representation for Irradiance Environment Maps. SIGGRAPH 2001.
+//
+// Coefficients stand in the order (l, m) = (0,0), (1,-1), (1,0), (1,1), (2,-2) .. (2,2). The basis is orthonormal
+// over the sphere, its polar axis is z, without the Condon-Shortley phase.
+
+/// The basis functions at a unit direction.
+fn sh_basis(direction: vec3f) -> array<f32, 9> {
+    let x = direction.x;
+    let y = direction.y;
+    let z = direction.z;
+    return array<f32, 9>(
+        0.2820948,
+        0.48860252 * y,
+        0.48860252 * z,
+        0.48860252 * x,
+        1.0925484 * x * y,
+        1.0925484 * y * z,
+        0.31539157 * (3.0 * z * z - 1.0),
+        1.0925484 * x * z,
+        0.5462742 * (x * x - y * y),
+    );
+}
+
+/// The function that the coefficients stand for, at a unit direction; negative where it rings.
+fn sh_evaluate(coefficients: array<vec3f, 9>, direction: vec3f) -> vec3f {
+    let basis = sh_basis(direction);
+    return coefficients[0] * basis[0] + coefficients[1] * basis[1] + coefficients[2] * basis[2]
+        + coefficients[3] * basis[3] + coefficients[4] * basis[4] + coefficients[5] * basis[5]
+        + coefficients[6] * basis[6] + coefficients[7] * basis[7] + coefficients[8] * basis[8];
+}
+
+/// Coefficients of irradiance from those of radiance (eq. 7), once per environment; `sh_evaluate` of the result is
+/// `sh_irradiance`, three multiplications a coefficient cheaper.
+fn sh_convolve_cosine(radiance: array<vec3f, 9>) -> array<vec3f, 9> {
+    // sqrt(4 pi / (2l + 1)) times the clamped cosine's own coefficient: π, 2π/3, π/4.
+    let band_zero = 3.14159265;
+    let band_one = 2.09439510;
+    let band_two = 0.78539816;
+    return array<vec3f, 9>(
+        radiance[0] * band_zero,
+        radiance[1] * band_one,
+        radiance[2] * band_one,
+        radiance[3] * band_one,
+        radiance[4] * band_two,
+        radiance[5] * band_two,
+        radiance[6] * band_two,
+        radiance[7] * band_two,
+        radiance[8] * band_two,
+    );
+}
+
+/// Irradiance on a surface with unit `normal`, the integral of radiance times the clamped cosine. Light from one small
+/// spot can make it slightly negative on the far side; clamp where that matters.
+fn sh_irradiance(radiance: array<vec3f, 9>, normal: vec3f) -> vec3f {
+    return sh_evaluate(sh_convolve_cosine(radiance), normal);
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/sym.wesl, by ./x shaders. Needs: nothing else
+
+// Symmetric matrices. A 2×2 one is a vec3f (xx, xy, yy), so that sums and scalings are the language's own; a 3×3
+// one is a mat3x3f.
+
+/// The 2×2 matrix with eigenvalue `l1` along the unit vector `axis` and `l2` across it.
+fn sym2_from_eigen(l1: f32, l2: f32, axis: vec2f) -> vec3f {
+    return vec3f(
+        l1 * axis.x * axis.x + l2 * axis.y * axis.y,
+        (l1 - l2) * axis.x * axis.y,
+        l1 * axis.y * axis.y + l2 * axis.x * axis.x,
+    );
+}
+
+/// `v v^T`.
+fn sym2_outer(v: vec2f) -> vec3f {
+    return vec3f(v.x * v.x, v.x * v.y, v.y * v.y);
+}
+
+/// Determinant of a 2×2 matrix.
+fn sym2_det(a: vec3f) -> f32 {
+    return a.x * a.z - a.y * a.y;
+}
+
+/// Trace of a 2×2 matrix.
+fn sym2_trace(a: vec3f) -> f32 {
+    return a.x + a.z;
+}
+
+/// `v^T A v`.
+fn sym2_quadratic(a: vec3f, v: vec2f) -> f32 {
+    return a.x * v.x * v.x + 2.0 * a.y * v.x * v.y + a.z * v.y * v.y;
+}
+
+/// Eigenvalues of a positive semi-definite 2×2 matrix and the unit eigenvector of the larger.
+struct SymEigen {
+    /// The larger eigenvalue.
+    larger: f32,
+    /// The smaller eigenvalue.
+    smaller: f32,
+    /// Unit eigenvector of the larger.
+    axis: vec2f,
+}
+
+/// Eigenvalues and axis of a positive semi-definite matrix, both at least zero. The axis has x ≥ 0 (and y = +1
+/// where x = 0) and is (1, 0) when both eigenvalues are equal. The smaller is `det / larger`, which keeps its digits
+/// where the textbook's half difference cancels.
+fn sym2_eigen(a: vec3f) -> SymEigen {
+    let half_difference = 0.5 * (a.x - a.z);
+    let radius = sqrt(half_difference * half_difference + a.y * a.y);
+    let larger = 0.5 * (a.x + a.z) + radius;
+    // A radius far below the rounding of the diagonal is none, and its square may underflow.
+    if radius <= 1e-12 * larger || larger <= 0.0 {
+        return SymEigen(max(larger, 0.0), max(larger - 2.0 * radius, 0.0), vec2f(1.0, 0.0));
+    }
+    let smaller = min(max(sym2_det(a) / larger, 0.0), larger);
+
+    // The larger component of the half-angle is free of cancellation, the other follows from xy.
+    let long = sqrt(0.5 + 0.5 * abs(half_difference) / radius);
+    let short = 0.5 * abs(a.y) / (radius * long);
+    let side = select(1.0, -1.0, a.y < 0.0);
+    let axis = select(vec2f(short, side * long), vec2f(long, side * short), half_difference >= 0.0);
+    return SymEigen(larger, smaller, axis);
+}
+
+/// The same eigenvectors with both eigenvalues clamped to `[lo, hi]`, `lo` ≥ 0. A matrix within the range comes back
+/// as it is.
+fn sym2_clamp_eigen(a: vec3f, lo: f32, hi: f32) -> vec3f {
+    let e = sym2_eigen(a);
+    let clamped = sym2_from_eigen(clamp(e.larger, lo, hi), clamp(e.smaller, lo, hi), e.axis);
+    return select(clamped, a, e.larger <= hi && e.smaller > lo);
+}
+
+/// The positive semi-definite square root of a positive semi-definite matrix:
+/// `(A + sqrt(det) I) / sqrt(trace + 2 sqrt(det))`, by Cayley–Hamilton.
+fn sym2_sqrt(a: vec3f) -> vec3f {
+    let root_det = sqrt(max(sym2_det(a), 0.0));
+    let scale = sqrt(sym2_trace(a) + 2.0 * root_det);
+    if scale == 0.0 {
+        return vec3f(0.0);
+    }
+    return (a + vec3f(root_det, 0.0, root_det)) * (1.0 / scale);
+}
+
+/// `v^T A v`.
+fn sym3_quadratic(a: mat3x3f, v: vec3f) -> f32 {
+    return dot(v, a * v);
+}
+
+/// Trace of a 3×3 matrix.
+fn sym3_trace(a: mat3x3f) -> f32 {
+    return a[0].x + a[1].y + a[2].z;
+}
+
+/// The adjugate of a symmetric matrix: `A adj(A) = det(A) I`. Its columns are the cross products of A's.
+fn sym3_adjugate(a: mat3x3f) -> mat3x3f {
+    return mat3x3f(cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]));
+}
+
+/// Determinant of a symmetric 3×3 matrix.
+fn sym3_det(a: mat3x3f) -> f32 {
+    return dot(a[0], cross(a[1], a[2]));
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/aniso.wesl, by ./x shaders. Needs: frame, sym
+
+// The aniso texel: squared roughness as three numbers that survive 8 bits, filtering and BC7.
+//
+// A texel holds [sqrt(Sxx), rho/2 + 1/2, sqrt(Syy)] with rho = Sxy / sqrt(Sxx Syy) (slide: Our Algorithm, step 4).
+// S is alpha² as a symmetric matrix in the frame of `m_n`. Sample the texture with the hardware's filter; every
+// average of texels decodes to a positive semi-definite matrix.
+
+/// Smallest GGX roughness to shade with: one step of an 8-bit aniso channel.
+const ALPHA_MIN: f32 = 0.00392156862745098;
+
+/// GGX alpha of a perceptual roughness in [0, 1]: its square, at least ALPHA_MIN.
+fn alpha_from_roughness(roughness: f32) -> f32 {
+    return max(roughness * roughness, ALPHA_MIN);
+}
+
+/// GGX alpha of a gloss in [0, 1]: `(1 - gloss)²`, at least ALPHA_MIN.
+fn alpha_from_gloss(gloss: f32) -> f32 {
+    return alpha_from_roughness(1.0 - gloss);
+}
+
+/// What a light needs of an aniso texel.
+struct AnisoDecoded {
+    /// Roughness along `tangent`, the larger one.
+    alpha_t: f32,
+    /// Roughness along `bitangent`, the smaller one.
+    alpha_b: f32,
+    /// Unit vector of the larger roughness.
+    tangent: vec3f,
+    /// Unit vector of the smaller roughness.
+    bitangent: vec3f,
+}
+
+/// Texel of a squared roughness matrix `s` (xx, xy, yy); each component in [0, 1]. rho is 0 where Sxx or Syy is 0.
+fn aniso_encode(s: vec3f) -> vec3f {
+    let product = s.x * s.z;
+    let rho = select(0.0, clamp(s.y * inverseSqrt(product), -1.0, 1.0), product > 0.0);
+    return vec3f(sqrt(saturate(s.x)), 0.5 * rho + 0.5, sqrt(saturate(s.z)));
+}
+
+/// Squared roughness matrix (xx, xy, yy) of a texel: positive semi-definite for every texel in [0, 1]³.
+///
+/// With `ggx_matrix_d` and `smith_matrix_v` this is all the decoding a light needs: cheaper than `aniso_decode` for a
+/// few lights. Add `sym2_clamp_eigen` where a determinant of zero would divide.
+fn aniso_decode_matrix(texel: vec3f) -> vec3f {
+    return vec3f(texel.x * texel.x, texel.x * (texel.y * 2.0 - 1.0) * texel.z, texel.z * texel.z);
+}
+
+/// Principal roughnesses and directions of a texel (slide: Our Algorithm, `DecodeSggx`), in the frame of the two unit
+/// vectors given, which are the first two columns of `m_n` brought to world space.
+///
+/// Differs from the slide in two points. alpha_b is `sqrt(det) / alpha_t` with `det = Sxx Syy (1 - rho²)`, where the
+/// slide's half difference cancels. And Sxy = 0 counts as positive: with HLSL's `sign`, which is zero there, the
+/// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
+/// 0.03° of the exact one.
+fn aniso_decode(texel: vec3f, tangent: vec3f, bitangent: vec3f) -> AnisoDecoded {
+    let rho = texel.y * 2.0 - 1.0;
+    let product = texel.x * texel.z;
+    let sxy = product * rho;
+    // The grain of 1e-12 gives a round lobe the axis (1, 0) and touches no other.
+    let sxx = texel.x * texel.x + 1e-12;
+    let syy = texel.z * texel.z;
+    let difference = sxx - syy;
+    let discr_sqr = difference * difference + 4.0 * sxy * sxy;
+    let discr_rcp = inverseSqrt(discr_sqr);
+
+    let alpha_t_sqr = 0.5 * (sxx + syy + discr_sqr * discr_rcp);
+    let alpha_t_rcp = inverseSqrt(alpha_t_sqr);
+    let alpha_t = alpha_t_sqr * alpha_t_rcp;
+    let alpha_b = product * sqrt(1.0 - rho * rho) * alpha_t_rcp;
+
+    let c_sqr = saturate(0.5 * difference * discr_rcp + 0.5);
+    let c = sqrt(c_sqr);
+    let s_abs = sqrt(1.0 - c_sqr);
+    let s = select(s_abs, -s_abs, sxy < 0.0);
+    return AnisoDecoded(
+        clamp(alpha_t, ALPHA_MIN, 1.0),
+        clamp(alpha_b, ALPHA_MIN, 1.0),
+        c * tangent + s * bitangent,
+        c * bitangent - s * tangent,
+    );
+}
+
+/// Squared roughness matrix (xx, xy, yy) with `alpha_t` along the unit vector `axis` of the `m_n` frame, `alpha_b`
+/// across.
+fn aniso_from_alphas(alpha_t: f32, alpha_b: f32, axis: vec2f) -> vec3f {
+    return sym2_from_eigen(alpha_t * alpha_t, alpha_b * alpha_b, axis);
+}
+
+/// Direction in the `m_n` frame of a direction painted in the mesh's tangent plane: what Gram–Schmidt, `d - (d·n) n`,
+/// makes of it. Both are unit vectors; where nothing is left of it, the direction stays as it is.
+fn axis_from_direction(direction: vec2f, n: vec3f) -> vec2f {
+    // The columns of m_n are orthogonal to n, so the Gram–Schmidt term drops out of both products.
+    let m = m_n(n);
+    let axis = vec2f(dot(m[0].xy, direction), dot(m[1].xy, direction));
+    let length_squared = dot(axis, axis);
+    return select(direction, axis * inverseSqrt(length_squared), length_squared > 1e-12);
+}
+
+/// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
+/// turns into `axis` of the `m_n` frame.
+fn direction_from_axis(axis: vec2f, n: vec3f) -> vec2f {
+    let m = m_n(n);
+    let t = m[0] * axis.x + m[1] * axis.y;
+    // In the plane of t and n, the vector without a z component; times n.z to survive the horizon.
+    let d = t.xy * n.z - t.z * n.xy;
+    let length_squared = dot(d, d);
+    return select(axis, d * inverseSqrt(length_squared), length_squared > 1e-12);
+}
+
+/// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
+/// `alpha_t = mix(alpha_b, 1, strength²)`.
+fn alphas_from_khr_anisotropy(roughness: f32, strength: f32) -> vec2f {
+    let alpha_b = alpha_from_roughness(roughness);
+    return vec2f(alpha_b + (1.0 - alpha_b) * strength * strength, alpha_b);
+}
+
+/// Perceptual roughness and anisotropy strength of `KHR_materials_anisotropy` for `alpha_t ≥ alpha_b`; the inverse of
+/// `alphas_from_khr_anisotropy`.
+fn khr_anisotropy_from_alphas(alpha_t: f32, alpha_b: f32) -> vec2f {
+    let rest = 1.0 - alpha_b;
+    let strength = select(0.0, sqrt(saturate((alpha_t - alpha_b) / rest)), rest > 0.0);
+    return vec2f(sqrt(alpha_b), strength);
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/ggx.wesl, by ./x shaders. Needs: sym
+
+// The GGX microfacet lobe, isotropic and anisotropic.
+//
+// All directions are unit vectors in the shading frame: z is the normal, x the tangent along which the roughness is
+// `alpha_t`, y the bitangent along which it is `alpha_b`. `alpha` is GGX roughness, the square of perceptual
+// roughness, from ALPHA_MIN to 1.
+//
+// A lobe of a light is D V F n·u times the light's irradiance. What depends on the view alone (the stretched v of the
+// visibility, products of alphas) is the same for every light, and compilers keep it out of an unrolled loop.
+
+/// The smallest positive normal number: keeps divisions finite.
+const MIN_POSITIVE: f32 = 1.1754944e-38;
+
+/// 1 / π.
+const FRAC_1_PI: f32 = 0.31830988618379067;
+
+/// Isotropic distribution of microfacet normals per steradian, `n_h = n·h` (Walter 2007, eq. 33). One ulp of `n_h`
+/// moves the peak by `2.4e-7 / alpha²`; where that matters, `ggx_aniso_d` has all the digits.
+fn ggx_d(n_h: f32, alpha: f32) -> f32 {
+    let a_sqr = alpha * alpha;
+    // 1 - n_h² as a product, which does not round before it cancels.
+    let q = (1.0 - n_h) * (1.0 + n_h) + a_sqr * n_h * n_h;
+    return a_sqr * FRAC_1_PI / (q * q);
+}
+
+/// Anisotropic distribution of microfacet normals per steradian (slide: Our Algorithm, the form with
+/// `(alpha_t alpha_b)^3`), for `h` in the upper hemisphere. Its integral against n·h over there is one.
+fn ggx_aniso_d(h: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
+    let alpha_tb = alpha_t * alpha_b;
+    let v = vec3f(h.x * alpha_b, h.y * alpha_t, h.z * alpha_tb);
+    let w = alpha_tb / dot(v, v);
+    return alpha_tb * FRAC_1_PI * w * w;
+}
+
+/// `ggx_aniso_d` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode:
+/// `|A|^(3/2) / (π (h.xy^T adj(A) h.xy + |A| h.z²)²)`. `|A|` must be positive.
+fn ggx_matrix_d(h: vec3f, a: vec3f) -> f32 {
+    let det = sym2_det(a);
+    let w = det / (sym2_quadratic(vec3f(a.z, -a.y, a.x), h.xy) + det * h.z * h.z);
+    return inverseSqrt(det) * FRAC_1_PI * w * w;
+}
+
+/// Visibility from the two terms of `2 n·u n·v (1 + Λ(u) + Λ(v))`: `n·v |u'|` and `n·u |v'|`, where the prime
+/// stretches a direction by the roughness. Finite, and meaningless, where both directions graze.
+fn smith_v_of_terms(u: f32, v: f32) -> f32 {
+    return 0.5 / max(u + v, MIN_POSITIVE);
+}
+
+/// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, isotropic (Heitz 2014, eq. 99).
+fn smith_v(n_u: f32, n_v: f32, alpha: f32) -> f32 {
+    let a_sqr = alpha * alpha;
+    let v = n_u * sqrt(n_v * n_v * (1.0 - a_sqr) + a_sqr);
+    let u = n_v * sqrt(n_u * n_u * (1.0 - a_sqr) + a_sqr);
+    return smith_v_of_terms(u, v);
+}
+
+/// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, anisotropic (Heitz 2014, eq. 99 with the lambda of section
+/// 5.3). `u` and `v` lie in the upper hemisphere.
+fn smith_aniso_v(u: vec3f, v: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
+    let stretch = vec3f(alpha_t, alpha_b, 1.0);
+    return smith_v_of_terms(v.z * length(u * stretch), u.z * length(v * stretch));
+}
+
+/// `smith_aniso_v` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode.
+fn smith_matrix_v(u: vec3f, v: vec3f, a: vec3f) -> f32 {
+    let stretched_u = sqrt(sym2_quadratic(a, u.xy) + u.z * u.z);
+    let stretched_v = sqrt(sym2_quadratic(a, v.xy) + v.z * v.z);
+    return smith_v_of_terms(v.z * stretched_u, u.z * stretched_v);
+}
+
+/// Smith masking of `v` alone, 0 to 1 (Heitz 2014, eq. 43).
+fn smith_aniso_g1(v: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
+    return 2.0 * v.z / (v.z + length(v * vec3f(alpha_t, alpha_b, 1.0)));
+}
+
+/// Fresnel reflectance by Schlick's approximation (1994) from `f0` at normal incidence to one at grazing.
+fn schlick_f(f0: vec3f, v_h: f32) -> vec3f {
+    let m = saturate(1.0 - v_h);
+    let m_sqr = m * m;
+    return f0 + (1.0 - f0) * (m_sqr * m_sqr * m);
+}
+
+/// A microfacet normal distributed as `ggx_vndf_pdf` for the view direction `v`, from two uniform numbers in [0, 1)
+/// (Dupuy, Benyoub 2023, listing 3).
+fn ggx_vndf_sample(v: vec3f, alpha_t: f32, alpha_b: f32, xi: vec2f) -> vec3f {
+    let stretch = vec3f(alpha_t, alpha_b, 1.0);
+    let v_std = normalize(v * stretch);
+
+    // Sample the spherical cap that reflects to the upper hemisphere.
+    let phi = 6.2831853 * xi.x;
+    let z = (1.0 - xi.y) * (1.0 + v_std.z) - v_std.z;
+    let sin_theta = sqrt(max(1.0 - z * z, 0.0));
+    let cap = vec3f(sin_theta * cos(phi), sin_theta * sin(phi), z);
+
+    // The rim of the cap is opposite to `v_std` in one point, where the sum may round to nothing.
+    let h = (cap + v_std) * stretch;
+    let length_squared = dot(h, h);
+    return select(vec3f(0.0, 0.0, 1.0), h * inverseSqrt(length_squared), length_squared > 0.0);
+}
+
+/// Density per steradian of microfacet normals visible from `v`: `G1(v) max(v·h, 0) D(h) / n·v` (Heitz 2014, eq. 16).
+/// Divide by `4 v·h` for the density of the reflected direction.
+fn ggx_vndf_pdf(v: vec3f, h: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
+    if h.z <= 0.0 {
+        return 0.0;
+    }
+    let g_over_n_v = 2.0 / (v.z + length(v * vec3f(alpha_t, alpha_b, 1.0)));
+    return g_over_n_v * max(dot(v, h), 0.0) * ggx_aniso_d(h, alpha_t, alpha_b);
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/sggx.wesl, by ./x shaders. Needs: frame, sym
+
+// SGGX matrices: a normal and its anisotropic roughness as one thing that can be averaged.
+//
+// Heitz, Dupuy, Crassin, Dachsbacher. The SGGX Microflake Distribution. SIGGRAPH 2015.
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+
+/// A surface: unit normal, and squared roughness matrix (xx, xy, yy) in the frame of `m_n`.
+struct GgxSurface {
+    /// Unit normal.
+    normal: vec3f,
+    /// Squared roughness (xx, xy, yy).
+    a: vec3f,
+}
+
+/// A distribution of slopes: centre and squared roughness (xx, xy, yy), both dimensionless.
+struct SlopeDistribution {
+    /// Centre.
+    m: vec2f,
+    /// Squared roughness (xx, xy, yy).
+    a: vec3f,
+}
+
+/// `S = M_n [A 0; 0 1] M_n^T` (slide: Our Algorithm, step 1): the SGGX matrix of a GGX surface with unit normal `n`
+/// and squared roughness matrix `a` (xx, xy, yy) in the frame of `m_n`.
+fn sggx_from_ggx(n: vec3f, a: vec3f) -> mat3x3f {
+    let m = m_n(n);
+    let ax = m[0] * a.x + m[1] * a.y;
+    let ay = m[0] * a.y + m[1] * a.z;
+    return mat3x3f(
+        ax * m[0].x + ay * m[1].x + n * n.x,
+        ax * m[0].y + ay * m[1].y + n * n.y,
+        ax * m[0].z + ay * m[1].z + n * n.z,
+    );
+}
+
+/// Area of the microflakes projected along the unit vector `w`: `sqrt(w^T S w)` (Heitz 2015).
+fn sggx_projected_area(s: mat3x3f, w: vec3f) -> f32 {
+    return sqrt(max(sym3_quadratic(s, w), 0.0));
+}
+
+/// Distribution of microflake normals at the unit vector `h`, a density per steradian over the sphere:
+/// `1 / (π sqrt|S| (h^T S^-1 h)^2)` (Heitz 2015), written as `|S|^(3/2) / (π (h^T adj(S) h)^2)`. `s` must have a
+/// positive determinant. Single precision leaves a relative error of 1e-5 over the smallest eigenvalue.
+fn sggx_d(s: mat3x3f, h: vec3f) -> f32 {
+    let det = sym3_det(s);
+    let q = sym3_quadratic(sym3_adjugate(s), h);
+    return det * sqrt(det) / (3.14159265 * q * q);
+}
+
+/// The slope distribution an SGGX matrix with zz > 0 stands for, seen from the z axis: `S / S_zz = [A + m m^T, m;
+/// m^T, 1]`. The slopes follow a bivariate Student-t with two degrees of freedom.
+fn slopes_from_sggx(s: mat3x3f) -> SlopeDistribution {
+    let inv = 1.0 / s[2].z;
+    let m = s[2].xy * inv;
+    let a = vec3f(s[0].x, s[0].y, s[1].y) * inv - vec3f(m.x * m.x, m.x * m.y, m.y * m.y);
+    return SlopeDistribution(m, a);
+}
+
+/// The SGGX matrix with zz = 1 of a slope distribution; the inverse of `slopes_from_sggx`.
+fn sggx_from_slopes(m: vec2f, a: vec3f) -> mat3x3f {
+    let xy = a.y + m.x * m.y;
+    return mat3x3f(vec3f(a.x + m.x * m.x, xy, m.x), vec3f(xy, a.z + m.y * m.y, m.y), vec3f(m, 1.0));
+}
+
+/// The talk's power iteration (slide: Our Algorithm, step 3): `steps` times `n = S n / |S n|` from `start`. The
+/// tangent of the error shrinks by the ratio of the two largest eigenvalues a step; in V grooves steeper than 45° it
+/// leaves the surface for its walls. `sggx_principal_axis` has neither fault.
+fn sggx_power_iteration(s: mat3x3f, start: vec3f, steps: u32) -> vec3f {
+    let scale = 1.0 / max(sym3_trace(s), 1e-30);
+    var n = start;
+    for (var i = 0u; i < steps; i++) {
+        let next = s * n * scale;
+        let length_squared = dot(next, next);
+        n = select(n, next * inverseSqrt(length_squared), length_squared > 0.0);
+    }
+    return n;
+}
+
+/// Squared overlap with the eigenvector of `l`, from the moments m' B m and |B m|² of a deviator of unit size.
+fn sggx_overlap(l: f32, moment: f32, moment_sqr: f32) -> f32 {
+    return (moment_sqr + l * moment + l * l - 3.0) / (3.0 * l * l - 3.0);
+}
+
+/// The unit eigenvector of `s` with the largest overlap with the unit vector `start`, signed to agree with it.
+/// Started at the mean normal of a footprint it finds the filtered normal, also where the largest eigenvalue is
+/// another one (V grooves steeper than 45°). Where eigenvalues coincide, to 0.1 % of their spread, it is the
+/// projection of `start` on their space; `start` itself if `s` is a multiple of the identity. No trigonometry.
+fn sggx_principal_axis(s: mat3x3f, start: vec3f) -> vec3f {
+    let sqrt_three = 1.7320508;
+    // Sine under which two eigenvalues are one: rounding of r alone makes 3e-4.
+    let coincidence = 1e-3;
+
+    // The deviator B of unit size and det B >= 0: its eigenvalues are 2 cos(φ), 2 cos(φ ± 2π/3) with 3φ = acos(r),
+    // the first at least sqrt(3) away from the others.
+    let identity = mat3x3f(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), vec3f(0.0, 0.0, 1.0));
+    let deviator = s * (1.0 / sym3_trace(s)) - identity * (1.0 / 3.0);
+    let squares = dot(deviator[0], deviator[0]) + dot(deviator[1], deviator[1]) + dot(deviator[2], deviator[2]);
+    let size = sqrt(squares * (1.0 / 6.0));
+    let unit = deviator * (1.0 / size);
+    let r = 0.5 * sym3_det(unit);
+    let b = unit * select(1.0, -1.0, r < 0.0);
+
+    // sin(2/3 asin(t)) with t = sin(3φ/2) <= sqrt(1/2) by four terms of its series, within 0.1 %: the refinement
+    // below cubes the error.
+    let t_sqr = max(0.5 - 0.5 * abs(r), 0.0);
+    let series = 1.0 + t_sqr * (5.0 / 54.0 + t_sqr * (77.0 / 1944.0 + t_sqr * (2431.0 / 104976.0)));
+    let sine = sqrt(t_sqr) * (2.0 / 3.0) * series;
+    let cosine = sqrt(1.0 - sine * sine);
+    let l_first = 2.0 * cosine;
+    let l_second = sqrt_three * sine - cosine;
+    let l_third = -sqrt_three * sine - cosine;
+
+    // Squared overlaps with the three eigenvectors.
+    let bn = b * start;
+    let moment = dot(start, bn);
+    let moment_sqr = dot(bn, bn);
+    let w_first = saturate(sggx_overlap(l_first, moment, moment_sqr));
+    let coincident = sine < coincidence;
+    let rest = 1.0 - w_first;
+    let w_second = select(min(max(sggx_overlap(l_second, moment, moment_sqr), 0.0), rest), rest, coincident);
+    let w_third = 1.0 - w_first - w_second;
+
+    // Project the two others away, (B - l I)(B - l' I), by Cayley–Hamilton.
+    let is_first = w_first >= max(w_second, w_third);
+    let p = bn - start * select(l_first, l_second, is_first);
+    let other = select(l_second, l_third, is_first || w_second >= w_third);
+    let q = b * p - p * other;
+    let projected = normalize(select(q, p, coincident && !is_first));
+
+    // One step of Rayleigh quotient iteration, adj(B - (n^T B n) I) n.
+    let refined = sym3_adjugate(b - identity * sym3_quadratic(b, projected)) * projected;
+    let refined_length = length(refined);
+    // The length is the product of the distances to both other eigenvalues, 6 sqrt(3) sine for a close one.
+    let far = refined_length > 6.0 * sqrt_three * coincidence;
+    let axis = select(projected, refined * (1.0 / refined_length), far);
+
+    // Rounding of S, 1e-7 of its trace, is all there is of a smaller deviator.
+    let n = select(start, axis, size > 3e-6);
+    return select(n, -n, dot(n, start) < 0.0);
+}
+
+/// `ggx_from_sggx` before the clamp of the roughness.
+fn ggx_from_sggx_unclamped(s: mat3x3f, mean_normal: vec3f) -> GgxSurface {
+    let axis = sggx_principal_axis(s, mean_normal);
+    let n = select(axis, -axis, axis.z < 0.0);
+    let m = m_n(n);
+    let sx = s * m[0];
+    let sy = s * m[1];
+    let inv = 1.0 / max(sym3_quadratic(s, n), 1e-30);
+    return GgxSurface(n, vec3f(dot(m[0], sx), dot(m[0], sy), dot(m[1], sy)) * inv);
+}
+
+/// Normal and squared roughness matrix of a filtered SGGX matrix (slide: Our Algorithm, step 3). `mean_normal`, a unit
+/// vector, picks the eigenvector as in `sggx_principal_axis`. The normal returned has z ≥ 0, eigenvalues of the
+/// roughness lie in [0, 1]: a microsurface rougher than alpha = 1 is clamped, because no texture can hold it.
+fn ggx_from_sggx(s: mat3x3f, mean_normal: vec3f) -> GgxSurface {
+    let surface = ggx_from_sggx_unclamped(s, mean_normal);
+    return GgxSurface(surface.normal, sym2_clamp_eigen(surface.a, 0.0, 1.0));
+}

@@ -1,0 +1,33 @@
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/multiscatter.wesl, by ./x shaders. Needs: nothing else
+
+// Energy that microfacet models lose between the facets, given back.
+//
+// Turquin. Practical multiple scattering compensation for microfacet models. 2019.
+
+/// Directional albedo of the single-scattering GGX lobe with height-correlated Smith masking and F = 1, for a view at
+/// cosine `n_v` (0 to 1): the share of a white furnace that comes back, 0.307 (= 1 − ln 2) to 1. A rational fit,
+/// within 0.011 of quadrature (0.004 RMS) for alpha and n_v in [0.005, 1]; it takes the place of a lookup table.
+fn ggx_directional_albedo(n_v: f32, alpha: f32) -> f32 {
+    let m = n_v;
+    let a = alpha;
+    let m_sqr = m * m;
+    let a_sqr = a * a;
+    let p = (0.00023917 + 0.004272 * a + 0.014007 * a_sqr)
+        + (0.13020 - 0.075028 * a + 3.2169 * a_sqr) * m
+        + (-0.034490 - 0.18897 * a + 0.089879 * a_sqr) * m_sqr;
+    let q = (-0.000019263 + 0.0054598 * a + 1.0288 * a_sqr)
+        + (0.0019317 - 1.1331 * a + 5.3123 * a_sqr) * m
+        + (1.0 - 1.3516 * a - 0.38030 * a_sqr) * m_sqr;
+    return clamp(1.0 - a * p / q, 0.3, 1.0);
+}
+
+/// Factor on the single-scattering lobe that restores the energy of all further bounces, `1 + f0 (1/E - 1)` (Turquin
+/// 2019, eq. 16), per pixel. The factor depends on the view alone, so the compensated lobe is not reciprocal. An
+/// anisotropic lobe uses the isotropic albedo at `alpha = sqrt((alpha_t² + alpha_b²)/2)`.
+fn multiscatter_compensation(f0: vec3f, n_v: f32, alpha_t: f32, alpha_b: f32) -> vec3f {
+    let alpha = sqrt(0.5 * (alpha_t * alpha_t + alpha_b * alpha_b));
+    let e = ggx_directional_albedo(saturate(n_v), alpha);
+    return 1.0 + f0 * (1.0 / e - 1.0);
+}
