@@ -38,7 +38,7 @@ fn texture() -> BoundTexture {
         MipLevel { width: size, height: size, texels: (0..size * size).map(texel).collect() }
     });
     BoundTexture {
-        texture: Arc::new(MipTexture { levels: levels.collect(), wrap: [Wrap::Repeat; 2] }),
+        texture: Arc::new(MipTexture { levels: levels.collect(), wrap: [Wrap::Repeat; 2], encoded: None }),
         uv_set: 0,
         transform: Mat3::IDENTITY,
     }

@@ -14,6 +14,12 @@ pub enum Error {
     /// The scene cannot be rendered as it is.
     #[error("{0}")]
     Scene(String),
+    /// There is no GPU, or it cannot do what is asked of it.
+    #[error("{0}")]
+    Gpu(String),
+    /// A shader does not compile; the compiler's message.
+    #[error("{0}")]
+    Shader(String),
     /// Two pictures cannot be compared pixel by pixel.
     #[error("the pictures have {a} and {b} pixels; compare pictures of the same size")]
     SizeMismatch {

@@ -49,7 +49,7 @@ fn anisotropy(scene: &Scene, material: &Material, sense: f32) -> Option<SurfaceT
             };
             let texels = (0..image.width * image.height).map(texel).collect();
             let level = MipLevel { width: image.width, height: image.height, texels };
-            BoundTexture::new(Arc::new(MipTexture { levels: vec![level], wrap: place.wrap }), place)
+            BoundTexture::new(Arc::new(MipTexture { levels: vec![level], wrap: place.wrap, encoded: None }), place)
         }
     };
     Some(SurfaceTextures { normal: BoundTexture::constant([0.5, 0.5, 0.0, 1.0]), aniso })
@@ -134,7 +134,7 @@ fn the_normal_tangent_test_s_mapped_bumps_look_like_its_modelled_ones() {
         let texels =
             texture.levels[0].texels.iter().map(|t| [t[0], 0.5 + flip * (t[1] - 0.5), 0.0, 1.0]).collect();
         let level = MipLevel { texels, ..texture.levels[0].clone() };
-        let normal = MipTexture { levels: vec![level], wrap: place.wrap };
+        let normal = MipTexture { levels: vec![level], wrap: place.wrap, encoded: None };
         let aniso = BoundTexture::constant([0.2, 0.5, 0.2, 1.0]);
         SurfaceTextures { normal: BoundTexture::new(Arc::new(normal), &place), aniso }
     };

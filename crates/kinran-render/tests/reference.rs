@@ -438,7 +438,7 @@ fn level_numbers(size: u32) -> BoundTexture {
             texels: vec![[k as f32, 0.0, 0.0, 1.0]; (side * side) as usize],
         }
     });
-    let texture = MipTexture { levels: levels.collect(), wrap: [Wrap::Repeat; 2] };
+    let texture = MipTexture { levels: levels.collect(), wrap: [Wrap::Repeat; 2], encoded: None };
     BoundTexture { texture: Arc::new(texture), uv_set: 0, transform: Mat3::IDENTITY }
 }
 
@@ -499,7 +499,7 @@ fn bump(size: u32, y_up: bool) -> BoundTexture {
         [0.5 + 0.5 * slope.x, 0.5 + 0.5 * slope.y, 0.0, 1.0]
     });
     let level = MipLevel { width: size, height: size, texels: texels.collect() };
-    let texture = MipTexture { levels: vec![level], wrap: [Wrap::Clamp; 2] };
+    let texture = MipTexture { levels: vec![level], wrap: [Wrap::Clamp; 2], encoded: None };
     BoundTexture { texture: Arc::new(texture), uv_set: 0, transform: Mat3::IDENTITY }
 }
 
@@ -741,7 +741,7 @@ fn mips_and_ground_truth_agree_where_there_is_nothing_to_filter() {
             let side = size >> k;
             MipLevel { width: side, height: side, texels: vec![texel; (side * side) as usize] }
         });
-        let texture = MipTexture { levels: levels.collect(), wrap: [Wrap::Mirror; 2] };
+        let texture = MipTexture { levels: levels.collect(), wrap: [Wrap::Mirror; 2], encoded: None };
         BoundTexture { texture: Arc::new(texture), uv_set: 0, transform: Mat3::IDENTITY }
     };
     scene.materials[0].surface = Some(SurfaceTextures {

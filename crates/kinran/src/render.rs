@@ -3,27 +3,31 @@
 use std::path::{Path, PathBuf};
 
 use kinran_image::{Channels, Image, Pixels, write_exr, write_png};
-use kinran_render::reference::TextureFiltering;
+use kinran_render::reference::{Film, RenderScene, TextureFiltering};
 use kinran_scene::Scene;
 use serde::Serialize;
 
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::values::filter;
 use crate::view::{View, ViewArgs, file_name};
-use crate::{Console, Error, outputs};
+use crate::{Console, Error, Progress, outputs};
 
-/// Renders a glTF file on the CPU
+/// Renders a glTF file
 ///
 /// Every material with a normal or an anisotropy map is baked in memory first, with the filter that --filter
 /// names and the block compression that `kinran bake` uses, and drawn with the mips that result, as a GPU
 /// would sample them. The same input gives the same picture, bit by bit, on any number of threads.
+///
+/// --backend gpu draws as a game does: deferred and forward, light from all around by spherical harmonics and
+/// a filtered probe, shadows of one directional light by a map.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran render lamp.glb -o lamp.png
   kinran render lamp.glb -o lamp.exr --size 1920x1080 --spp 256 --env studio.hdr --env-rotation 90
   kinran render lamp.glb -o far.png --distance 8 --filter naive
   kinran render lamp.glb -o truth.png --filter none --spp 1024
-  kinran render lamp.glb -o sun.png --env none --light 1,2,1 --background 0.2,0.3,0.5")]
+  kinran render lamp.glb -o sun.png --env none --light 1,2,1 --background 0.2,0.3,0.5
+  kinran render lamp.glb -o game.png --backend gpu")]
 pub struct Args {
     /// The .glb or .gltf file
     #[arg(value_name = "FILE")]
@@ -32,6 +36,10 @@ pub struct Args {
     /// The picture: .png for displays, .exr for linear radiance
     #[arg(long, short, value_name = "PICTURE")]
     pub output: PathBuf,
+
+    /// What draws: the reference renderer on the CPU, or a GPU by Vulkan
+    #[arg(long, value_enum, default_value_t = Backend::Cpu)]
+    pub backend: Backend,
 
     /// Samples in a pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
@@ -49,6 +57,15 @@ pub struct Args {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub view: ViewArgs,
+}
+
+/// What draws a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Backend {
+    /// [`kinran_render::reference`].
+    Cpu,
+    /// `kinran_render::realtime`.
+    Gpu,
 }
 
 fn mips(text: &str) -> Result<Mips, String> {
@@ -76,6 +93,10 @@ struct Summary {
 /// the file.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     outputs::check_file(&args.output, &["png", "exr"])?;
+    if args.backend == Backend::Gpu && cfg!(not(feature = "gpu")) {
+        let fix = "build it with `cargo build --release -p kinran --features gpu`, or use --backend cpu";
+        return Err(Error::Usage(format!("--backend gpu: this kinran was built without a GPU renderer; {fix}")));
+    }
     let scene = Scene::load(&args.file)?;
     let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
     let progress = console.progress();
@@ -88,7 +109,10 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         Mips::Filtered(_) => TextureFiltering::Mips { max_anisotropy: args.max_anisotropy },
     };
     let prepared = view.scene(&scene, surfaces)?;
-    let film = view.render(&prepared, "render", args.spp, filtering, &progress)?;
+    let film = match args.backend {
+        Backend::Cpu => view.render(&prepared, "render", args.spp, filtering, &progress)?,
+        Backend::Gpu => gpu_film(&view, &prepared, args.spp, &progress)?,
+    };
     if outputs::has_extension(&args.output, "exr") {
         let pixels = Pixels::F32(film.pixels.into_flattened());
         write_exr(&args.output, &Image::new(film.width, film.height, Channels::Rgb, pixels)?)?;
@@ -115,6 +139,23 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         summary.filter
     );
     console.result(&summary, &text)
+}
+
+#[cfg(feature = "gpu")]
+fn gpu_film(view: &View, scene: &RenderScene, samples: u32, progress: &Progress) -> Result<Film, Error> {
+    use kinran_render::realtime::{Gpu, Realtime, Settings, ShaderSource};
+    let gpu = Gpu::open()?;
+    // Nothing is shown on a display, so any format will do.
+    let renderer = Realtime::new(&gpu, &ShaderSource::default(), wgpu::TextureFormat::Rgba8Unorm)?;
+    let scene = renderer.load(scene);
+    let settings = Settings { shadows: view.shadows, background: view.background, ..Settings::default() };
+    let stage = progress.stage("render", u64::from(samples));
+    Ok(renderer.film(&scene, &view.camera, &settings, view.size, samples, &|_, _| stage.add(1))?)
+}
+
+#[cfg(not(feature = "gpu"))]
+fn gpu_film(_: &View, _: &RenderScene, _: u32, _: &Progress) -> Result<Film, Error> {
+    Err(Error::Internal("a build without a GPU renderer was asked for one".into()))
 }
 
 /// Triangles in the world, instances counted each.

@@ -105,7 +105,7 @@ fn level_0(maps: &SurfaceMaps, sheet: Sheet) -> MipTexture {
             [r, g, b, 1.0]
         }));
     }
-    MipTexture { levels: vec![MipLevel { width, height, texels }], wrap: maps.wrap }
+    MipTexture { levels: vec![MipLevel { width, height, texels }], wrap: maps.wrap, encoded: None }
 }
 
 /// Normals and roughness that lie on the mesh in different ways, each filtered by itself. Roughness is then

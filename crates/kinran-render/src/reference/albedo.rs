@@ -9,12 +9,13 @@ use kinran_shading::{
 use std::sync::LazyLock;
 
 /// Nodes along the square root of n·v and along that of alpha.
-const SIZE: usize = 32;
+pub(crate) const SIZE: usize = 32;
 
 /// Samples for a cell; their error of the mean is under 0.002.
 const SAMPLES: u32 = 256;
 
-static GRAZING: LazyLock<Vec<f32>> = LazyLock::new(|| {
+/// The part of the lobe's albedo that Schlick's `(1 - v·h)^5` carries, at every node, n·v fastest.
+pub(crate) static GRAZING: LazyLock<Vec<f32>> = LazyLock::new(|| {
     let at = |i: usize| i as f32 / (SIZE - 1) as f32;
     (0..SIZE * SIZE).map(|i| grazing_albedo(at(i % SIZE).powi(2), at(i / SIZE).powi(2), SAMPLES)).collect()
 });

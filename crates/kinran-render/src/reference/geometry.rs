@@ -11,13 +11,13 @@ pub const MAX_TRIANGLES: usize = 1 << 26;
 /// All instances of a scene as world-space triangles.
 pub struct Geometry {
     bvh: Bvh,
-    positions: Vec<Vec3>,
-    normals: Vec<Vec3>,
-    tangents: Vec<Vec4>,
-    uvs: Vec<[Vec2; 2]>,
-    colors: Vec<Vec4>,
-    triangles: Vec<[u32; 3]>,
-    materials: Vec<u32>,
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) normals: Vec<Vec3>,
+    pub(crate) tangents: Vec<Vec4>,
+    pub(crate) uvs: Vec<[Vec2; 2]>,
+    pub(crate) colors: Vec<Vec4>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) materials: Vec<u32>,
     min: Vec3,
     max: Vec3,
 }

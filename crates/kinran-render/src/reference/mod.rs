@@ -5,13 +5,13 @@
 //! an environment (diffuse by order-2 spherical harmonics, specular by multiple importance sampling). There is
 //! no light between surfaces.
 
-mod albedo;
+pub(crate) mod albedo;
 mod bvh;
 mod camera;
 mod geometry;
 mod light;
 mod render;
-mod sampler;
+pub(crate) mod sampler;
 mod scene;
 mod shading;
 mod texture;

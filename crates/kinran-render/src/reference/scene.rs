@@ -65,7 +65,7 @@ pub struct RenderMaterial {
 pub struct Surroundings {
     /// Radiance and its sampling.
     pub environment: Environment,
-    irradiance: Sh9,
+    pub(crate) irradiance: Sh9,
 }
 
 impl Surroundings {

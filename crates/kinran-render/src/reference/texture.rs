@@ -7,7 +7,7 @@
 use glam::{Vec2, Vec4, vec2};
 use kinran_image::{Image, Pixels, Texture, Transfer};
 use kinran_scene::Wrap;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 /// One level of a [`MipTexture`].
 #[derive(Clone, Debug, PartialEq)]
@@ -27,13 +27,15 @@ pub struct MipTexture {
     pub levels: Vec<MipLevel>,
     /// Repetition along u and v.
     pub wrap: [Wrap; 2],
+    /// The runtime texture whose levels these are, for a GPU that can read it as it is.
+    pub encoded: Option<Arc<Texture>>,
 }
 
 impl MipTexture {
     /// A texture that is `texel` everywhere.
     pub fn constant(texel: [f32; 4]) -> Self {
         let level = MipLevel { width: 1, height: 1, texels: vec![texel] };
-        MipTexture { levels: vec![level], wrap: [Wrap::Repeat; 2] }
+        MipTexture { levels: vec![level], wrap: [Wrap::Repeat; 2], encoded: None }
     }
 
     /// An authored image with box-filtered mips: every level is the area average of the one above. sRGB
@@ -54,7 +56,7 @@ impl MipTexture {
         while let Some(top) = levels.last().filter(|l| l.width > 1 || l.height > 1) {
             levels.push(halve(top));
         }
-        MipTexture { levels, wrap }
+        MipTexture { levels, wrap, encoded: None }
     }
 
     /// The decoded levels of a runtime texture as they are, sRGB colour linearised.
@@ -71,7 +73,7 @@ impl MipTexture {
             }
             levels.push(MipLevel { width: level.width, height: level.height, texels });
         }
-        Ok(MipTexture { levels, wrap })
+        Ok(MipTexture { levels, wrap, encoded: Some(Arc::new(texture.clone())) })
     }
 
     /// Bilinear sample of one level.
@@ -226,7 +228,7 @@ mod tests {
 
     fn ramp(wrap: Wrap) -> MipTexture {
         let texels = (0..4).map(|x| [x as f32, 0.0, 0.0, 1.0]).collect();
-        MipTexture { levels: vec![MipLevel { width: 4, height: 1, texels }], wrap: [wrap; 2] }
+        MipTexture { levels: vec![MipLevel { width: 4, height: 1, texels }], wrap: [wrap; 2], encoded: None }
     }
 
     #[test]
@@ -309,7 +311,7 @@ mod tests {
             height,
             texels: vec![[0.0; 4]; (width * height) as usize],
         };
-        let texture = MipTexture { levels: vec![level(64, 16)], wrap: [Wrap::Repeat; 2] };
+        let texture = MipTexture { levels: vec![level(64, 16)], wrap: [Wrap::Repeat; 2], encoded: None };
         // Four texels along u, eight along v.
         let lod = texture.lod(vec2(4.0 / 64.0, 0.0), vec2(0.0, 8.0 / 16.0));
         assert!((lod - 3.0).abs() < 1e-6, "wanted 3, got {lod}");
@@ -328,7 +330,7 @@ mod tests {
                 texels: vec![[k as f32, 0.0, 0.0, 0.0]; (size * size) as usize],
             }
         });
-        let texture = MipTexture { levels: levels.collect(), wrap: [Wrap::Repeat; 2] };
+        let texture = MipTexture { levels: levels.collect(), wrap: [Wrap::Repeat; 2], encoded: None };
         let footprint = [vec2(16.0 / 64.0, 0.0), vec2(0.0, 2.0 / 64.0)];
         for (max_anisotropy, wanted) in [(1, 4.0), (2, 3.0), (4, 2.0), (8, 1.0), (16, 1.0)] {
             let got = texture.sample_grad(vec2(0.3, 0.7), footprint[0], footprint[1], max_anisotropy).x;
@@ -343,7 +345,7 @@ mod tests {
             height: size,
             texels: vec![[value; 4]; (size * size) as usize],
         };
-        let texture = MipTexture { levels: vec![level(2, 0.0), level(1, 1.0)], wrap: [Wrap::Repeat; 2] };
+        let texture = MipTexture { levels: vec![level(2, 0.0), level(1, 1.0)], wrap: [Wrap::Repeat; 2], encoded: None };
         for (lod, wanted) in [(-3.0, 0.0), (0.0, 0.0), (0.25, 0.25), (1.0, 1.0), (9.0, 1.0)] {
             assert_eq!(texture.sample_lod(vec2(0.1, 0.9), lod).x, wanted, "lod {lod}");
         }

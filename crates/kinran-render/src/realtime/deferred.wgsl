@@ -1,0 +1,60 @@
+// The deferred path's lighting: Lambert and isotropic GGX with coloured specular, once for each pixel.
+
+@group(1) @binding(0) var base_texture: texture_2d<f32>;
+@group(1) @binding(1) var normal_texture: texture_2d<u32>;
+@group(1) @binding(2) var factors_texture: texture_2d<f32>;
+@group(1) @binding(3) var depth_texture: texture_depth_2d;
+
+@vertex
+fn everywhere(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+    return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+}
+
+@fragment
+fn light(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
+    let at = vec2i(pixel.xy);
+    let depth = textureLoad(depth_texture, at, 0);
+    if depth == 1.0 {
+        discard;
+    }
+    let ndc = pixel.xy / frame.display.xy * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
+    let world = frame.inverse_view_projection * vec4f(ndc, depth, 1.0);
+    let base = textureLoad(base_texture, at, 0);
+    let factors = textureLoad(factors_texture, at, 0);
+
+    var surface: Surface;
+    surface.position = world.xyz / world.w;
+    surface.normal = octahedral_decode(textureLoad(normal_texture, at, 0).r);
+    surface.geometric_normal = surface.normal;
+    let frame_of = m_n(select(surface.normal, -surface.normal, surface.normal.z < 0.0));
+    surface.tangent = frame_of[0];
+    surface.bitangent = frame_of[1];
+    surface.alpha_t = alpha_from_roughness(factors.r);
+    surface.alpha_b = surface.alpha_t;
+    surface.base_color = base.rgb;
+    surface.metallic = factors.g;
+    surface.occlusion = factors.b;
+    surface.opacity = 1.0;
+
+    let view = normalize(frame.camera.xyz - surface.position);
+    let lobe = lobe_of(surface, view);
+    var sum = ambient(surface, lobe, 1u);
+    for (var i = 0u; i < frame.counts.x; i++) {
+        let light = frame.lights[i];
+        let incoming = incident(light, surface.position);
+        let u = vec3f(
+            dot(surface.tangent, incoming.direction),
+            dot(surface.bitangent, incoming.direction),
+            dot(surface.normal, incoming.direction),
+        );
+        if u.z <= 0.0 {
+            continue;
+        }
+        var visible = 1.0;
+        if light.color.w > 0.5 {
+            visible = shadow(surface, incoming.direction);
+        }
+        sum += (lobe.diffuse / PI + specular_isotropic(surface, lobe, u)) * incoming.irradiance * (u.z * visible);
+    }
+    return vec4f(sum, 1.0);
+}

@@ -1,0 +1,51 @@
+// The forward path: anisotropic GGX, and whatever else does not fit into the G-buffer.
+
+fn lit(surface: Surface, lobe: Lobe) -> vec3f {
+    var sum = surface.emitted + ambient(surface, lobe, 8u);
+    for (var i = 0u; i < frame.counts.x; i++) {
+        let light = frame.lights[i];
+        let incoming = incident(light, surface.position);
+        let u = vec3f(
+            dot(surface.tangent, incoming.direction),
+            dot(surface.bitangent, incoming.direction),
+            dot(surface.normal, incoming.direction),
+        );
+        if u.z <= 0.0 {
+            continue;
+        }
+        var visible = 1.0;
+        if light.color.w > 0.5 {
+            visible = shadow(surface, incoming.direction);
+        }
+        let reflected = lobe.diffuse / PI + specular_anisotropic(surface, lobe, u);
+        sum += reflected * incoming.irradiance * (u.z * visible);
+    }
+    return sum;
+}
+
+@fragment
+fn opaque(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let surface = surface_at(in, front);
+    if surface.opacity == 0.0 {
+        discard;
+    }
+    let view = normalize(frame.camera.xyz - in.position);
+    return vec4f(shown(surface, lit(surface, lobe_of(surface, view)), uv(in, 0u)), 1.0);
+}
+
+// What a blended surface adds to what is behind it.
+@fragment
+fn blended(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let surface = surface_at(in, front);
+    let view = normalize(frame.camera.xyz - in.position);
+    return vec4f(surface.opacity * lit(surface, lobe_of(surface, view)), 1.0);
+}
+
+// What a blended surface leaves of what is behind it.
+@fragment
+fn transmittance(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let surface = surface_at(in, front);
+    let view = normalize(frame.camera.xyz - in.position);
+    let through = 1.0 - surface.opacity + surface.opacity * lobe_of(surface, view).transmitted;
+    return vec4f(through, 1.0);
+}

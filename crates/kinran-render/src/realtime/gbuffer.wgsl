@@ -1,0 +1,28 @@
+// The G-buffer of the deferred path.
+//
+// base:    rgb base colour (sRGB), a: translucent in the top bit, fuzziness in the other seven.
+// normal:  unit normal, octahedral, 16 bits a component in one word.
+// factors: r perceptual roughness, g metallic, b occlusion.
+// What a surface emits goes straight to the picture.
+
+struct GBuffer {
+    @location(0) base: vec4f,
+    @location(1) normal: u32,
+    @location(2) factors: vec4f,
+    @location(3) emitted: vec4f,
+}
+
+@fragment
+fn fill(in: Varying, @builtin(front_facing) front: bool) -> GBuffer {
+    let surface = surface_at(in, front);
+    if surface.opacity == 0.0 {
+        discard;
+    }
+    let roughness = sqrt(sqrt(surface.alpha_t * surface.alpha_b));
+    return GBuffer(
+        vec4f(surface.base_color, 0.0),
+        octahedral_encode(surface.normal),
+        vec4f(roughness, surface.metallic, surface.occlusion, 0.0),
+        vec4f(surface.emitted, 1.0),
+    );
+}

@@ -1,0 +1,157 @@
+// A surface in light. The model is the reference renderer's: GGX with multiscatter compensation over Lambert, which has
+// what the specular lobe leaves.
+
+const DIELECTRIC: f32 = 0.04;
+// Smallest cosine between shading normal and view.
+const N_V_MIN: f32 = 1e-3;
+
+struct Surface {
+    position: vec3f,
+    // Of the mesh, towards the viewer.
+    geometric_normal: vec3f,
+    normal: vec3f,
+    tangent: vec3f,
+    bitangent: vec3f,
+    alpha_t: f32,
+    alpha_b: f32,
+    base_color: vec3f,
+    metallic: f32,
+    // 0 opaque, 1: what is not reflected passes through.
+    transmissive: f32,
+    occlusion: f32,
+    emitted: vec3f,
+    opacity: f32,
+}
+
+// What follows from a surface for one view.
+struct Lobe {
+    // View in the shading frame.
+    v: vec3f,
+    base_reflectance: vec3f,
+    compensation: vec3f,
+    // Directional albedo of the specular lobe.
+    albedo: vec3f,
+    diffuse: vec3f,
+    transmitted: vec3f,
+}
+
+// The part of the specular albedo that Schlick's (1 - v·h)^5 carries, from the reference renderer's table.
+fn grazing_albedo(n_v: f32, alpha: f32) -> f32 {
+    let size = vec2f(textureDimensions(albedo_map));
+    let place = sqrt(saturate(vec2f(n_v, alpha)));
+    return textureSampleLevel(albedo_map, clamp_sampler, (place * (size - 1.0) + 0.5) / size, 0.0).r;
+}
+
+fn lobe_of(surface: Surface, view: vec3f) -> Lobe {
+    let v = vec3f(dot(surface.tangent, view), dot(surface.bitangent, view), max(dot(surface.normal, view), N_V_MIN));
+    let alpha = sqrt(0.5 * (surface.alpha_t * surface.alpha_t + surface.alpha_b * surface.alpha_b));
+    let white = ggx_directional_albedo(v.z, alpha);
+    let grazing = grazing_albedo(v.z, alpha);
+    let base_reflectance = mix(vec3f(DIELECTRIC), surface.base_color, surface.metallic);
+    let compensation = multiscatter_compensation(base_reflectance, v.z, surface.alpha_t, surface.alpha_b);
+    let single = base_reflectance * (white - grazing) + grazing;
+
+    let dielectric = (DIELECTRIC * (white - grazing) + grazing)
+        * multiscatter_compensation(vec3f(DIELECTRIC), v.z, surface.alpha_t, surface.alpha_b).x;
+    let passed = surface.base_color * (1.0 - surface.metallic) * (1.0 - min(dielectric, 1.0));
+    return Lobe(
+        v,
+        base_reflectance,
+        compensation,
+        min(single * compensation, vec3f(1.0)),
+        passed * (1.0 - surface.transmissive),
+        passed * surface.transmissive,
+    );
+}
+
+struct Incident {
+    direction: vec3f,
+    irradiance: vec3f,
+}
+
+// What arrives from a punctual light (KHR_lights_punctual), without shadows.
+fn incident(light: Light, position: vec3f) -> Incident {
+    if light.position.w < 0.5 {
+        return Incident(-light.direction.xyz, light.color.rgb);
+    }
+    let to_light = light.position.xyz - position;
+    let distance_sqr = max(dot(to_light, to_light), 1e-12);
+    let direction = to_light * inverseSqrt(distance_sqr);
+    let ramp = saturate((-dot(direction, light.direction.xyz) - light.cone.y) / max(light.cone.x - light.cone.y, 1e-3));
+    let falloff = select(1.0, ramp * ramp, light.position.w > 1.5);
+    let ratio = distance_sqr / (light.direction.w * light.direction.w);
+    let window = saturate(1.0 - ratio * ratio);
+    return Incident(direction, light.color.rgb * (falloff * window / distance_sqr));
+}
+
+// The share of the shadowed light that reaches a point, by percentage-closer filtering over 3 × 3 texels, each of them
+// filtered bilinearly.
+fn shadow(surface: Surface, direction: vec3f) -> f32 {
+    let size = f32(textureDimensions(shadow_map).x);
+    // A texel and a half off the surface along its normal, more where light grazes.
+    let texel = 2.0 / (size * length(frame.light_projection[0].xyz));
+    let slope = 1.0 - abs(dot(surface.geometric_normal, direction));
+    let lifted = surface.position + surface.geometric_normal * (texel * (0.5 + 1.5 * slope));
+    let clip = frame.light_projection * vec4f(lifted, 1.0);
+    let uv = clip.xy * vec2f(0.5, -0.5) + 0.5;
+    var lit = 0.0;
+    for (var i = -1; i <= 1; i++) {
+        for (var j = -1; j <= 1; j++) {
+            let offset = vec2f(f32(i), f32(j)) / size;
+            lit += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + offset, clip.z);
+        }
+    }
+    let outside = any(abs(clip.xy) > vec2f(1.0));
+    return select(lit / 9.0, 1.0, outside);
+}
+
+// Specular lobe times nothing: per steradian, without the cosine. `u` lies above the horizon.
+fn specular_anisotropic(surface: Surface, lobe: Lobe, u: vec3f) -> vec3f {
+    let h = normalize(u + lobe.v);
+    let d = ggx_aniso_d(h, surface.alpha_t, surface.alpha_b);
+    let visibility = smith_aniso_v(u, lobe.v, surface.alpha_t, surface.alpha_b);
+    return d * visibility * schlick_f(lobe.base_reflectance, dot(lobe.v, h)) * lobe.compensation;
+}
+
+fn specular_isotropic(surface: Surface, lobe: Lobe, u: vec3f) -> vec3f {
+    let h = normalize(u + lobe.v);
+    let d = ggx_d(saturate(h.z), surface.alpha_t);
+    let visibility = smith_v(u.z, lobe.v.z, surface.alpha_t);
+    return d * visibility * schlick_f(lobe.base_reflectance, dot(lobe.v, h)) * lobe.compensation;
+}
+
+// Light from all around, diffuse by spherical harmonics, specular by a fan of probe lookups: an anisotropic lobe is
+// a round one of the smaller roughness, smeared along the direction of the larger. Its slopes along that direction are
+// Student-t distributed; `taps` quantiles of it, weighted as visible normals are, stand for them.
+fn ambient(surface: Surface, lobe: Lobe, taps: u32) -> vec3f {
+    if frame.counts.y == 0u {
+        return vec3f(0.0);
+    }
+    var coefficients: array<vec3f, 9>;
+    for (var i = 0; i < 9; i++) {
+        coefficients[i] = frame.irradiance[i].rgb;
+    }
+    let diffuse = lobe.diffuse / PI * max(sh_evaluate(coefficients, surface.normal), vec3f(0.0));
+
+    let spread = sqrt(max(surface.alpha_t * surface.alpha_t - surface.alpha_b * surface.alpha_b, 0.0));
+    let count = select(taps, 1u, spread < 0.02);
+    let to_world = mat3x3f(surface.tangent, surface.bitangent, surface.normal);
+    let roughness = sqrt(surface.alpha_b);
+    var sum = vec3f(0.0);
+    var weights = 0.0;
+    for (var i = 0u; i < count; i++) {
+        let p = (2.0 * f32(i) + 1.0) / f32(count) - 1.0;
+        let slope = spread * p * inverseSqrt(1.0 - p * p);
+        let h = normalize(vec3f(-slope, 0.0, 1.0));
+        let v_h = dot(lobe.v, h);
+        let u = 2.0 * v_h * h - lobe.v;
+        let weight = max(v_h, 0.0) / h.z * saturate(u.z * 16.0 + 0.5);
+        // A rough lobe leans from the mirror direction towards its normal (Lagarde, de Rousiers 2014).
+        let alpha = surface.alpha_b;
+        let lean = (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha);
+        sum += weight * probe(normalize(to_world * mix(h, u, lean)), roughness);
+        weights += weight;
+    }
+    let specular = sum / max(weights, 1e-6) * lobe.albedo;
+    return surface.occlusion * (diffuse + specular);
+}

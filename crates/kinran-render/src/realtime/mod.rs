@@ -1,0 +1,710 @@
+//! A real-time renderer on wgpu, as in the talk: deferred for Lambert with isotropic GGX, forward for anisotropic GGX.
+//!
+//! [`Realtime`] is made once for a device, [`GpuScene`] once for a scene; [`Realtime::draw`] adds one jittered frame to a
+//! [`Target`], which shows the mean of all frames since it was cleared. The material model is the
+//! [`reference`](mod@crate::reference)'s; what differs is light from all around (spherical harmonics and a filtered
+//! probe instead of samples of the environment) and shadows (a map of one directional light instead of rays).
+
+mod device;
+mod probe;
+mod shaders;
+mod target;
+mod upload;
+
+use glam::camera::rh;
+use glam::{Mat4, Vec2, Vec3, Vec4};
+use kinran_scene::{Camera, LightKind};
+
+use crate::reference::sampler::sample_2d;
+use crate::reference::{Background, Film, RenderScene};
+use crate::tonemap::Tonemap;
+use crate::Error;
+
+pub use device::{Gpu, wanted_features};
+pub use shaders::ShaderSource;
+pub use target::Target;
+pub use upload::GpuScene;
+use upload::{Path, VERTEX_FLOATS};
+
+/// Lights that a frame may have.
+pub const MAX_LIGHTS: usize = 16;
+
+/// Texels along a side of the shadow map.
+const SHADOW_SIZE: u32 = 2048;
+
+const HDR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+const SUM: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// Base colour, normal, factors.
+const G_BUFFER: [wgpu::TextureFormat; 3] =
+    [wgpu::TextureFormat::Rgba8UnormSrgb, wgpu::TextureFormat::R32Uint, wgpu::TextureFormat::Rgba8Unorm];
+
+/// What is shown of surfaces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Channel {
+    /// The lit picture.
+    #[default]
+    Lit,
+    /// World-space normal, from [-1, 1] to [0, 1].
+    Normal,
+    /// The larger roughness.
+    AlphaT,
+    /// The smaller roughness.
+    AlphaB,
+    /// Direction of the larger roughness as hue, anisotropy as brightness.
+    Direction,
+    /// Level of detail of the normal map over ten.
+    Mip,
+    /// Base colour.
+    BaseColor,
+}
+
+/// How to draw a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The first directional light casts shadows.
+    pub shadows: bool,
+    /// Behind everything. The environment is shown sharp: `blur` is not followed.
+    pub background: Background,
+    /// What is shown.
+    pub channel: Channel,
+    /// Stops, for [`Realtime::show`].
+    pub exposure: f32,
+    /// Tone curve, for [`Realtime::show`].
+    pub tonemap: Tonemap,
+    /// Every opaque material takes the deferred path, its roughness made round.
+    pub all_deferred: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            shadows: true,
+            background: Background::Environment { blur: 0.0 },
+            channel: Channel::Lit,
+            exposure: 0.0,
+            tonemap: Tonemap::Aces,
+            all_deferred: false,
+        }
+    }
+}
+
+/// What resources a shader sees: group 0 in every pass, group 1 by the pass.
+pub(crate) struct Layouts {
+    frame: wgpu::BindGroupLayout,
+    shadow: wgpu::BindGroupLayout,
+    material: wgpu::BindGroupLayout,
+    g_buffer: wgpu::BindGroupLayout,
+    accumulate: wgpu::BindGroupLayout,
+    show: wgpu::BindGroupLayout,
+}
+
+/// Pipelines of every pass; opaque ones for single-sided and double-sided materials.
+struct Pipelines {
+    shadow: wgpu::RenderPipeline,
+    fill: [wgpu::RenderPipeline; 2],
+    light: wgpu::RenderPipeline,
+    opaque: [wgpu::RenderPipeline; 2],
+    sky: wgpu::RenderPipeline,
+    transmittance: [wgpu::RenderPipeline; 2],
+    blended: [wgpu::RenderPipeline; 2],
+    accumulate: wgpu::RenderPipeline,
+    show: wgpu::RenderPipeline,
+}
+
+/// The renderer.
+pub struct Realtime {
+    gpu: Gpu,
+    layouts: Layouts,
+    pipelines: Pipelines,
+    frame: wgpu::Buffer,
+    albedo: wgpu::TextureView,
+    shadow_map: wgpu::TextureView,
+    around: wgpu::Sampler,
+    clamp: wgpu::Sampler,
+    compare: wgpu::Sampler,
+    shown: wgpu::TextureFormat,
+}
+
+/// Floats of the uniform that frame.wgsl declares.
+const FRAME_FLOATS: usize = 3 * 16 + 2 * 4 + 9 * 4 + 2 * 4 + MAX_LIGHTS * 16;
+
+impl Realtime {
+    /// A renderer whose [`show`](Realtime::show) draws to targets of format `shown`, one that does not encode sRGB itself.
+    ///
+    /// # Errors
+    /// [`Error::Shader`] when a shader of `source` does not compile.
+    pub fn new(gpu: &Gpu, source: &ShaderSource, shown: wgpu::TextureFormat) -> Result<Self, Error> {
+        let layouts = Layouts::new(&gpu.device);
+        let pipelines = Pipelines::new(&gpu.device, &layouts, source, shown)?;
+        let buffer = wgpu::BufferDescriptor {
+            label: Some("frame"),
+            size: FRAME_FLOATS as u64 * 4,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        };
+        let sampler = |address_mode_u, compare| {
+            gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                address_mode_u,
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                mipmap_filter: wgpu::MipmapFilterMode::Linear,
+                compare,
+                ..Default::default()
+            })
+        };
+        use wgpu::AddressMode::{ClampToEdge, Repeat};
+        Ok(Self {
+            frame: gpu.device.create_buffer(&buffer),
+            albedo: upload::albedo_table(gpu),
+            shadow_map: target::texture(&gpu.device, (SHADOW_SIZE, SHADOW_SIZE), DEPTH),
+            around: sampler(Repeat, None),
+            clamp: sampler(ClampToEdge, None),
+            compare: sampler(ClampToEdge, Some(wgpu::CompareFunction::LessEqual)),
+            gpu: gpu.clone(),
+            layouts,
+            pipelines,
+            shown,
+        })
+    }
+
+    /// The device that draws.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Compiles the shaders of `source`; when one does not compile, those that were there stay.
+    ///
+    /// # Errors
+    /// [`Error::Shader`] with file, line and the compiler's message.
+    pub fn reload_shaders(&mut self, source: &ShaderSource) -> Result<(), Error> {
+        self.pipelines = Pipelines::new(&self.gpu.device, &self.layouts, source, self.shown)?;
+        Ok(())
+    }
+
+    /// Brings a scene to the device. Filtering its environment takes a second or so.
+    pub fn load(&self, scene: &RenderScene) -> GpuScene {
+        GpuScene::new(&self.gpu, &self.layouts, scene)
+    }
+
+    /// Adds a frame to `target`. Frames differ in where in the pixel they look.
+    pub fn draw(&self, scene: &GpuScene, camera: &Camera, settings: &Settings, target: &mut Target) {
+        let jitter = sample_2d(target.frames, 0, 0);
+        let floats = self.frame_floats(scene, camera, settings, target, jitter);
+        self.gpu.queue.write_buffer(&self.frame, 0, &upload::bytes(&floats));
+        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+
+        let frame = self.frame_group(scene);
+        if target.frames == 0 {
+            self.draw_shadows(&mut encoder, scene);
+        }
+        let path = |draw: &&upload::Draw| match scene.materials[draw.material].path {
+            Path::Forward if settings.all_deferred && settings.channel == Channel::Lit => Path::Deferred,
+            // The G-buffer has no channels to show.
+            Path::Deferred if settings.channel != Channel::Lit => Path::Forward,
+            path => path,
+        };
+        let draws = |wanted| scene.draws.iter().filter(move |draw| path(draw) == wanted);
+        self.fill(&mut encoder, &frame, scene, target, draws(Path::Deferred));
+        self.light(&mut encoder, &frame, target);
+
+        // Opaque first, then the sky behind it, then what lets both through, the farthest first.
+        let mut pass = target.hdr_pass(&mut encoder);
+        pass.set_bind_group(0, &frame, &[]);
+        pass.set_vertex_buffer(0, scene.vertices.slice(..));
+        pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
+        for draw in draws(Path::Forward) {
+            let material = &scene.materials[draw.material];
+            pass.set_pipeline(&self.pipelines.opaque[usize::from(material.double_sided)]);
+            pass.set_bind_group(1, &material.bind_group, &[]);
+            pass.draw_indexed(draw.indices.clone(), 0, 0..1);
+        }
+        pass.set_pipeline(&self.pipelines.sky);
+        pass.draw(0..3, 0..1);
+        let mut blended: Vec<_> = draws(Path::Blended).collect();
+        let eye = Vec3::from(camera.transform.translation);
+        blended.sort_by(|a, b| b.middle.distance(eye).total_cmp(&a.middle.distance(eye)));
+        for draw in blended {
+            let material = &scene.materials[draw.material];
+            pass.set_bind_group(1, &material.bind_group, &[]);
+            for pipelines in [&self.pipelines.transmittance, &self.pipelines.blended] {
+                pass.set_pipeline(&pipelines[usize::from(material.double_sided)]);
+                pass.draw_indexed(draw.indices.clone(), 0, 0..1);
+            }
+        }
+        drop(pass);
+
+        // Into the sum of all frames.
+        let [before, after] = target.sums();
+        let group = self.group(&self.layouts.accumulate, &[before, target.hdr()]);
+        let mut pass = color_pass(&mut encoder, after, wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT));
+        pass.set_pipeline(&self.pipelines.accumulate);
+        pass.set_bind_group(0, &frame, &[]);
+        pass.set_bind_group(1, &group, &[]);
+        pass.draw(0..3, 0..1);
+        drop(pass);
+        self.gpu.queue.submit([encoder.finish()]);
+        target.frames += 1;
+    }
+
+    /// Shows the mean of `target`'s frames on `view`, tonemapped and encoded.
+    pub fn show(&self, target: &Target, view: &wgpu::TextureView, scene: &GpuScene) {
+        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let group = self.group(&self.layouts.show, &[target.sums()[0]]);
+        let mut pass = color_pass(&mut encoder, view, wgpu::LoadOp::Clear(wgpu::Color::BLACK));
+        pass.set_pipeline(&self.pipelines.show);
+        pass.set_bind_group(0, &self.frame_group(scene), &[]);
+        pass.set_bind_group(1, &group, &[]);
+        pass.draw(0..3, 0..1);
+        drop(pass);
+        self.gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// A picture of `samples` frames, as the reference renderer returns it. `progress` is called with the frames done and
+    /// of all.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a size that the device does not draw or for no samples, [`Error::Gpu`] when the picture
+    /// cannot be read back.
+    pub fn film(
+        &self,
+        scene: &GpuScene,
+        camera: &Camera,
+        settings: &Settings,
+        size: (u32, u32),
+        samples: u32,
+        progress: &dyn Fn(usize, usize),
+    ) -> Result<Film, Error> {
+        let largest = self.gpu.device.limits().max_texture_dimension_2d;
+        let refuse = |name, value: u32, fix| Err(Error::Setting { name, value: value.to_string(), fix });
+        for (name, side) in [("width", size.0), ("height", size.1)] {
+            if !(1..=largest).contains(&side) {
+                return refuse(name, side, "it must be at least 1 and at most what the GPU draws, 8192 or more");
+            }
+        }
+        if samples == 0 {
+            return refuse("samples", samples, "it must be at least 1");
+        }
+        let mut target = Target::new(self, size);
+        for frame in 0..samples {
+            self.draw(scene, camera, settings, &mut target);
+            progress(frame as usize + 1, samples as usize);
+        }
+        target.film(&self.gpu)
+    }
+
+    fn frame_floats(
+        &self,
+        scene: &GpuScene,
+        camera: &Camera,
+        settings: &Settings,
+        target: &Target,
+        jitter: Vec2,
+    ) -> Vec<f32> {
+        let (width, height) = (target.size.0 as f32, target.size.1 as f32);
+        let scene = &scene.scene;
+        let (min, max) = scene.geometry.bounds().unwrap_or((Vec3::NEG_ONE, Vec3::ONE));
+        let (middle, radius) = (0.5 * (min + max), (0.5 * (max - min)).length().max(1e-6));
+
+        // Near and far just hold the model.
+        let eye = Vec3::from(camera.transform.translation);
+        let far = (eye.distance(middle) + radius) * 1.01;
+        let near = ((eye.distance(middle) - radius) * 0.99).max(far * 1e-4);
+        // The place in the pixel that this frame looks at becomes its centre.
+        let shift = Vec3::new(1.0 - 2.0 * jitter.x, 2.0 * jitter.y - 1.0, 0.0) / Vec3::new(width, height, 1.0);
+        let projection = Mat4::from_translation(shift) * rh::proj::directx::perspective(camera.yfov, width / height, near, far);
+        let view_projection = projection * Mat4::from(camera.transform).inverse();
+
+        // The shadow map sees the whole model.
+        let directional = |light: &&kinran_scene::Light| light.kind == LightKind::Directional;
+        let sun = scene.lights.iter().find(directional).filter(|_| settings.shadows);
+        let light_projection = sun.map_or(Mat4::IDENTITY, |sun| {
+            let up = if sun.direction.y.abs() > 0.99 { Vec3::X } else { Vec3::Y };
+            let view = rh::view::look_to_mat4(middle - radius * sun.direction, sun.direction, up);
+            rh::proj::directx::orthographic(-radius, radius, -radius, radius, 0.0, 2.0 * radius) * view
+        });
+
+        let mut floats = Vec::with_capacity(FRAME_FLOATS);
+        for matrix in [view_projection, view_projection.inverse(), light_projection] {
+            floats.extend(matrix.to_cols_array());
+        }
+        floats.extend(eye.extend(1.0).to_array());
+        let background = match settings.background {
+            Background::Color(color) => color.extend(0.0),
+            Background::Environment { .. } => Vec4::W,
+        };
+        floats.extend(background.to_array());
+        let irradiance = scene.surroundings.as_ref().map(|s| s.irradiance).unwrap_or_default();
+        floats.extend(irradiance.iter().flat_map(|c| c.extend(0.0).to_array()));
+        let lights = &scene.lights[..scene.lights.len().min(MAX_LIGHTS)];
+        let levels = if scene.surroundings.is_some() { probe::LEVELS as u32 } else { 0 };
+        let counts = [lights.len() as u32, levels, settings.channel as u32, 0];
+        floats.extend(counts.map(f32::from_bits));
+        let curve = match settings.tonemap {
+            Tonemap::None => 0.0,
+            Tonemap::Aces => 1.0,
+            Tonemap::AgX => 2.0,
+        };
+        floats.extend([width, height, settings.exposure.exp2(), curve]);
+        for light in lights {
+            let (kind, inner, outer) = match light.kind {
+                LightKind::Directional => (0.0, 0.0, 0.0),
+                LightKind::Spot { inner_cone_angle, outer_cone_angle } => (2.0, inner_cone_angle, outer_cone_angle),
+                _ => (1.0, 0.0, 0.0),
+            };
+            let shadowed = sun.is_some_and(|sun| std::ptr::eq(sun, light));
+            floats.extend(light.position.extend(kind).to_array());
+            // A range without end, squared, must stay a number.
+            floats.extend(light.direction.extend(light.range.min(1e18)).to_array());
+            floats.extend(light.color.extend(f32::from(u8::from(shadowed))).to_array());
+            floats.extend([libm::cosf(inner), libm::cosf(outer), 0.0, 0.0]);
+        }
+        floats.resize(FRAME_FLOATS, 0.0);
+        floats
+    }
+
+    fn group(&self, layout: &wgpu::BindGroupLayout, views: &[&wgpu::TextureView]) -> wgpu::BindGroup {
+        let resources = views.iter().map(|view| wgpu::BindingResource::TextureView(view));
+        let entries: Vec<_> =
+            (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+    }
+
+    fn frame_group(&self, scene: &GpuScene) -> wgpu::BindGroup {
+        use wgpu::BindingResource::{Sampler, TextureView};
+        let resources = [
+            self.frame.as_entire_binding(),
+            TextureView(&scene.environment),
+            TextureView(&scene.probe),
+            TextureView(&self.albedo),
+            TextureView(&self.shadow_map),
+            Sampler(&self.around),
+            Sampler(&self.clamp),
+            Sampler(&self.compare),
+        ];
+        let entries: Vec<_> =
+            (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+        let layout = &self.layouts.frame;
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+    }
+
+    fn draw_shadows(&self, encoder: &mut wgpu::CommandEncoder, scene: &GpuScene) {
+        let group = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &self.layouts.shadow,
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: self.frame.as_entire_binding() }],
+        });
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("shadow"),
+            depth_stencil_attachment: Some(depth_attachment(&self.shadow_map, wgpu::LoadOp::Clear(1.0))),
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.pipelines.shadow);
+        pass.set_bind_group(0, &group, &[]);
+        pass.set_vertex_buffer(0, scene.vertices.slice(..));
+        pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
+        for draw in scene.draws.iter().filter(|draw| scene.materials[draw.material].path != Path::Blended) {
+            pass.draw_indexed(draw.indices.clone(), 0, 0..1);
+        }
+    }
+
+    fn fill<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        frame: &wgpu::BindGroup,
+        scene: &GpuScene,
+        target: &Target,
+        draws: impl Iterator<Item = &'a upload::Draw>,
+    ) {
+        let mut pass = target.fill_pass(encoder);
+        pass.set_bind_group(0, frame, &[]);
+        pass.set_vertex_buffer(0, scene.vertices.slice(..));
+        pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
+        for draw in draws {
+            let material = &scene.materials[draw.material];
+            pass.set_pipeline(&self.pipelines.fill[usize::from(material.double_sided)]);
+            pass.set_bind_group(1, &material.bind_group, &[]);
+            pass.draw_indexed(draw.indices.clone(), 0, 0..1);
+        }
+    }
+
+    fn light(&self, encoder: &mut wgpu::CommandEncoder, frame: &wgpu::BindGroup, target: &Target) {
+        let [base, normal, factors] = target.g_buffer();
+        let group = self.group(&self.layouts.g_buffer, &[base, normal, factors, target.depth()]);
+        let mut pass = color_pass(encoder, target.hdr(), wgpu::LoadOp::Load);
+        pass.set_pipeline(&self.pipelines.light);
+        pass.set_bind_group(0, frame, &[]);
+        pass.set_bind_group(1, &group, &[]);
+        pass.draw(0..3, 0..1);
+    }
+}
+
+fn depth_attachment(
+    view: &wgpu::TextureView,
+    load: wgpu::LoadOp<f32>,
+) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
+        stencil_ops: None,
+    }
+}
+
+fn color_attachment(
+    view: &wgpu::TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+) -> Option<wgpu::RenderPassColorAttachment<'_>> {
+    let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
+    Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
+}
+
+fn color_pass<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    view: &wgpu::TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+) -> wgpu::RenderPass<'a> {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        color_attachments: &[color_attachment(view, load)],
+        ..Default::default()
+    })
+}
+
+impl Layouts {
+    fn new(device: &wgpu::Device) -> Self {
+        use wgpu::{BindingType, SamplerBindingType as S, TextureSampleType as T};
+        let uniform = BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        };
+        let texture = |sample_type| BindingType::Texture {
+            sample_type,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
+        let layout = |types: &[BindingType]| {
+            let entry = |(i, &ty): (usize, &BindingType)| wgpu::BindGroupLayoutEntry {
+                binding: i as u32,
+                visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+                ty,
+                count: None,
+            };
+            let entries: Vec<_> = types.iter().enumerate().map(entry).collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
+        };
+        let (filtered, raw) = (texture(T::Float { filterable: true }), texture(T::Float { filterable: false }));
+        let smooth = BindingType::Sampler(S::Filtering);
+        let mut material = vec![uniform];
+        material.extend([filtered; 6]);
+        material.extend([smooth; 6]);
+        Layouts {
+            frame: layout(&[
+                uniform,
+                filtered,
+                filtered,
+                filtered,
+                texture(T::Depth),
+                smooth,
+                smooth,
+                BindingType::Sampler(S::Comparison),
+            ]),
+            shadow: layout(&[uniform]),
+            material: layout(&material),
+            g_buffer: layout(&[raw, texture(T::Uint), raw, texture(T::Depth)]),
+            accumulate: layout(&[raw, raw]),
+            show: layout(&[raw]),
+        }
+    }
+}
+
+/// What distinguishes a pipeline from the others.
+struct Pass<'a> {
+    files: &'a [&'a str],
+    groups: &'a [&'a wgpu::BindGroupLayout],
+    vertex: &'a str,
+    /// Attributes of the vertex buffer that are read, from the first; none for passes over the whole picture.
+    attributes: usize,
+    fragment: Option<&'a str>,
+    targets: &'a [wgpu::TextureFormat],
+    blend: Option<wgpu::BlendState>,
+    /// Comparison with the depth buffer, and whether it is written.
+    depth: Option<(wgpu::CompareFunction, bool)>,
+    cull: bool,
+}
+
+impl Pipelines {
+    fn new(
+        device: &wgpu::Device,
+        layouts: &Layouts,
+        source: &ShaderSource,
+        shown: wgpu::TextureFormat,
+    ) -> Result<Self, Error> {
+        use wgpu::CompareFunction::{Less, LessEqual};
+        let mesh = ["frame.wgsl", "lighting.wgsl", "surface.wgsl", "channels.wgsl", "forward.wgsl"];
+        let fill = ["frame.wgsl", "lighting.wgsl", "surface.wgsl", "octahedral.wgsl", "gbuffer.wgsl"];
+        let light_files = ["frame.wgsl", "lighting.wgsl", "octahedral.wgsl", "deferred.wgsl"];
+        let material = [&layouts.frame, &layouts.material];
+        let everywhere = Pass {
+            files: &[],
+            groups: &[],
+            vertex: "everywhere",
+            attributes: 0,
+            fragment: None,
+            targets: &[],
+            blend: None,
+            depth: None,
+            cull: false,
+        };
+        let component = |src_factor, dst_factor| wgpu::BlendComponent {
+            src_factor,
+            dst_factor,
+            operation: wgpu::BlendOperation::Add,
+        };
+        let blend = |color| wgpu::BlendState { color, alpha: wgpu::BlendComponent::OVER };
+        let add = blend(component(wgpu::BlendFactor::One, wgpu::BlendFactor::One));
+        let multiply = blend(component(wgpu::BlendFactor::Zero, wgpu::BlendFactor::Src));
+        let on_mesh = |files, fragment, targets, blend, depth| -> Result<[wgpu::RenderPipeline; 2], Error> {
+            let pass = |cull| {
+                pipeline(
+                    device,
+                    source,
+                    &Pass {
+                        files,
+                        groups: &material,
+                        vertex: "vertex",
+                        attributes: 5,
+                        fragment: Some(fragment),
+                        targets,
+                        blend,
+                        depth: Some(depth),
+                        cull,
+                    },
+                )
+            };
+            Ok([pass(true)?, pass(false)?])
+        };
+        let [base, normal, factors] = G_BUFFER;
+        Ok(Self {
+            shadow: pipeline(
+                device,
+                source,
+                &Pass {
+                    files: &["frame.wgsl", "shadow.wgsl"],
+                    groups: &[&layouts.shadow],
+                    vertex: "depth",
+                    attributes: 1,
+                    depth: Some((Less, true)),
+                    ..everywhere
+                },
+            )?,
+            fill: on_mesh(&fill[..], "fill", &[base, normal, factors, HDR][..], None, (Less, true))?,
+            light: pipeline(
+                device,
+                source,
+                &Pass {
+                    files: &light_files,
+                    groups: &[&layouts.frame, &layouts.g_buffer],
+                    fragment: Some("light"),
+                    targets: &[HDR],
+                    blend: Some(add),
+                    ..everywhere
+                },
+            )?,
+            opaque: on_mesh(&mesh[..], "opaque", &[HDR][..], None, (Less, true))?,
+            sky: pipeline(
+                device,
+                source,
+                &Pass {
+                    files: &["frame.wgsl", "background.wgsl"],
+                    groups: &[&layouts.frame],
+                    vertex: "far",
+                    fragment: Some("sky"),
+                    targets: &[HDR],
+                    depth: Some((LessEqual, false)),
+                    ..everywhere
+                },
+            )?,
+            transmittance: on_mesh(&mesh[..], "transmittance", &[HDR][..], Some(multiply), (Less, false))?,
+            blended: on_mesh(&mesh[..], "blended", &[HDR][..], Some(add), (Less, false))?,
+            accumulate: pipeline(
+                device,
+                source,
+                &Pass {
+                    files: &["frame.wgsl", "accumulate.wgsl"],
+                    groups: &[&layouts.frame, &layouts.accumulate],
+                    fragment: Some("add"),
+                    targets: &[SUM],
+                    ..everywhere
+                },
+            )?,
+            show: pipeline(
+                device,
+                source,
+                &Pass {
+                    files: &["frame.wgsl", "tonemap.wgsl"],
+                    groups: &[&layouts.frame, &layouts.show],
+                    fragment: Some("display"),
+                    targets: &[shown],
+                    ..everywhere
+                },
+            )?,
+        })
+    }
+}
+
+fn pipeline(device: &wgpu::Device, source: &ShaderSource, pass: &Pass) -> Result<wgpu::RenderPipeline, Error> {
+    let text = source.pass(pass.files)?;
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: None,
+        source: wgpu::ShaderSource::Wgsl(text.into()),
+    });
+    let groups: Vec<_> = pass.groups.iter().map(|group| Some(*group)).collect();
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: None,
+        bind_group_layouts: &groups,
+        immediate_size: 0,
+    });
+    let attributes =
+        wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x4, 4 => Float32x4];
+    let buffers = [Some(wgpu::VertexBufferLayout {
+        array_stride: VERTEX_FLOATS as u64 * 4,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &attributes[..pass.attributes],
+    })];
+    let targets: Vec<_> = (pass.targets.iter())
+        .map(|&format| {
+            Some(wgpu::ColorTargetState { format, blend: pass.blend, write_mask: wgpu::ColorWrites::ALL })
+        })
+        .collect();
+    Ok(device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: pass.fragment,
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some(pass.vertex),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: &buffers[..usize::from(pass.attributes > 0)],
+        },
+        primitive: wgpu::PrimitiveState {
+            cull_mode: pass.cull.then_some(wgpu::Face::Back),
+            ..Default::default()
+        },
+        depth_stencil: pass.depth.map(|(compare, write)| wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(write),
+            depth_compare: Some(compare),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState::default(),
+        fragment: pass.fragment.map(|entry| wgpu::FragmentState {
+            module: &module,
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    }))
+}

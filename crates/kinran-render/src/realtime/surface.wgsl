@@ -1,0 +1,112 @@
+// A material at a point of a mesh.
+
+struct Material {
+    base_color: vec4f,
+    // rgb emitted, w occlusion strength.
+    emissive: vec4f,
+    // x metallic, y roughness, z alpha cutoff, w transmissive.
+    factors: vec4f,
+    // x 1: normals and roughness from the surface textures, y alpha mode: 0 opaque, 1 mask, 2 blend,
+    // z 1: double sided.
+    flags: vec4u,
+    // Rows of the six textures' transforms; w of the first row is the UV set.
+    transforms: array<vec4f, 12>,
+}
+
+@group(1) @binding(0) var<uniform> material: Material;
+@group(1) @binding(1) var normal_map: texture_2d<f32>;
+@group(1) @binding(2) var aniso_map: texture_2d<f32>;
+@group(1) @binding(3) var base_color_map: texture_2d<f32>;
+@group(1) @binding(4) var metallic_roughness_map: texture_2d<f32>;
+@group(1) @binding(5) var occlusion_map: texture_2d<f32>;
+@group(1) @binding(6) var emissive_map: texture_2d<f32>;
+@group(1) @binding(7) var normal_sampler: sampler;
+@group(1) @binding(8) var aniso_sampler: sampler;
+@group(1) @binding(9) var base_color_sampler: sampler;
+@group(1) @binding(10) var metallic_roughness_sampler: sampler;
+@group(1) @binding(11) var occlusion_sampler: sampler;
+@group(1) @binding(12) var emissive_sampler: sampler;
+
+struct Vertex {
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) tangent: vec4f,
+    @location(3) uvs: vec4f,
+    @location(4) color: vec4f,
+}
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) tangent: vec4f,
+    @location(3) uvs: vec4f,
+    @location(4) color: vec4f,
+}
+
+@vertex
+fn vertex(in: Vertex) -> Varying {
+    let clip = frame.view_projection * vec4f(in.position, 1.0);
+    return Varying(clip, in.position, in.normal, in.tangent, in.uvs, in.color);
+}
+
+fn uv(in: Varying, texture: u32) -> vec2f {
+    let row = material.transforms[2u * texture];
+    let below = material.transforms[2u * texture + 1u];
+    let uv = vec3f(select(in.uvs.xy, in.uvs.zw, row.w > 0.5), 1.0);
+    return vec2f(dot(row.xyz, uv), dot(below.xyz, uv));
+}
+
+fn base_color_at(in: Varying) -> vec4f {
+    return material.base_color * in.color * textureSample(base_color_map, base_color_sampler, uv(in, 2u));
+}
+
+fn surface_at(in: Varying, front: bool) -> Surface {
+    var surface: Surface;
+    let view = normalize(frame.camera.xyz - in.position);
+    let base = base_color_at(in);
+    let metallic_roughness = textureSample(metallic_roughness_map, metallic_roughness_sampler, uv(in, 3u));
+    let occlusion = textureSample(occlusion_map, occlusion_sampler, uv(in, 4u)).r;
+    let emissive = textureSample(emissive_map, emissive_sampler, uv(in, 5u)).rgb;
+    let normal_xy = textureSample(normal_map, normal_sampler, uv(in, 0u)).rg * 2.0 - 1.0;
+    let texel = textureSample(aniso_map, aniso_sampler, uv(in, 1u)).rgb;
+
+    // Normal and roughness in the tangent frame of the mesh, which is not normalised: MikkTSpace.
+    let alpha = alpha_from_roughness(saturate(material.factors.y * metallic_roughness.g));
+    let mapped = material.flags.x == 1u;
+    let n = select(vec3f(0.0, 0.0, 1.0), normal_from_xy(normal_xy.x, normal_xy.y), mapped);
+    let encoded = select(vec3f(alpha, 0.5, alpha), texel, mapped);
+
+    // To world space. Back faces are the same relief seen from behind.
+    let side = select(-1.0, 1.0, front);
+    let to_world = mat3x3f(in.tangent.xyz, in.tangent.w * cross(in.normal, in.tangent.xyz), in.normal);
+    var normal = normalize(to_world * n * side);
+    let n_v = dot(normal, view);
+    if n_v < N_V_MIN {
+        normal = normalize(normal + (N_V_MIN - n_v) * view);
+    }
+    let basis = m_n(n);
+    let along = to_world * basis[0] * side;
+    let tangent = normalize(along - normal * dot(normal, along));
+    let across = cross(normal, tangent);
+    let bitangent = select(across, -across, dot(across, to_world * basis[1] * side) < 0.0);
+    let aniso = aniso_decode(encoded, tangent, bitangent);
+
+    surface.position = in.position;
+    surface.geometric_normal = normalize(in.normal) * side;
+    surface.normal = normal;
+    surface.tangent = aniso.tangent;
+    surface.bitangent = aniso.bitangent;
+    surface.alpha_t = aniso.alpha_t;
+    surface.alpha_b = aniso.alpha_b;
+    surface.base_color = base.rgb;
+    surface.metallic = saturate(material.factors.x * metallic_roughness.b);
+    surface.transmissive = material.factors.w;
+    surface.occlusion = 1.0 + material.emissive.w * (occlusion - 1.0);
+    surface.emitted = material.emissive.rgb * emissive;
+    surface.opacity = select(1.0, saturate(base.a), material.flags.y == 2u);
+    if material.flags.y == 1u && base.a < material.factors.z {
+        surface.opacity = 0.0;
+    }
+    return surface;
+}

@@ -1,0 +1,151 @@
+//! What a renderer draws into.
+
+use super::{DEPTH, G_BUFFER, Gpu, HDR, Realtime, SUM, color_attachment, depth_attachment};
+use crate::Error;
+use crate::reference::Film;
+
+/// The buffers of a picture of one size, and the sum of the frames drawn so far.
+pub struct Target {
+    /// Pixels in a row, rows.
+    pub size: (u32, u32),
+    /// Frames in the sum.
+    pub frames: u32,
+    hdr: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    g_buffer: [wgpu::TextureView; 3],
+    /// Written in turn.
+    sums: [wgpu::TextureView; 2],
+}
+
+/// A texture that is drawn into and read.
+pub(super) fn texture(
+    device: &wgpu::Device,
+    (width, height): (u32, u32),
+    format: wgpu::TextureFormat,
+) -> wgpu::TextureView {
+    let mut usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+    if format == SUM {
+        usage |= wgpu::TextureUsages::COPY_SRC;
+    }
+    let descriptor = wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    };
+    device.create_texture(&descriptor).create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+impl Target {
+    /// An empty picture. `size` must lie within the device's limits and not be zero.
+    pub fn new(renderer: &Realtime, size: (u32, u32)) -> Self {
+        let device = &renderer.gpu().device;
+        let texture = |format| texture(device, size, format);
+        Self {
+            size,
+            frames: 0,
+            hdr: texture(HDR),
+            depth: texture(DEPTH),
+            g_buffer: G_BUFFER.map(texture),
+            sums: [texture(SUM), texture(SUM)],
+        }
+    }
+
+    /// Forgets all frames: the next one replaces them. To be called when what is drawn changes.
+    pub fn clear(&mut self, renderer: &Realtime) {
+        if self.frames > 0 {
+            self.frames = 0;
+            let device = &renderer.gpu().device;
+            self.sums = [texture(device, self.size, SUM), texture(device, self.size, SUM)];
+        }
+    }
+
+    pub(super) fn hdr(&self) -> &wgpu::TextureView {
+        &self.hdr
+    }
+
+    pub(super) fn depth(&self) -> &wgpu::TextureView {
+        &self.depth
+    }
+
+    pub(super) fn g_buffer(&self) -> [&wgpu::TextureView; 3] {
+        self.g_buffer.each_ref()
+    }
+
+    /// The sum so far, and where the next one goes.
+    pub(super) fn sums(&self) -> [&wgpu::TextureView; 2] {
+        let [even, odd] = &self.sums;
+        if self.frames.is_multiple_of(2) { [even, odd] } else { [odd, even] }
+    }
+
+    /// Clears everything and draws into the G-buffer.
+    pub(super) fn fill_pass<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::RenderPass<'a> {
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+        let [base, normal, factors] = self.g_buffer();
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("fill"),
+            color_attachments: &[base, normal, factors, &self.hdr].map(|view| color_attachment(view, clear)),
+            depth_stencil_attachment: Some(depth_attachment(&self.depth, wgpu::LoadOp::Clear(1.0))),
+            ..Default::default()
+        })
+    }
+
+    /// Draws over what is there.
+    pub(super) fn hdr_pass<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::RenderPass<'a> {
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("forward"),
+            color_attachments: &[color_attachment(&self.hdr, wgpu::LoadOp::Load)],
+            depth_stencil_attachment: Some(depth_attachment(&self.depth, wgpu::LoadOp::Load)),
+            ..Default::default()
+        })
+    }
+
+    /// The mean of all frames as linear radiance.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] when the device does not give it back.
+    pub fn film(&self, gpu: &Gpu) -> Result<Film, Error> {
+        let (width, height) = self.size;
+        // Rows are padded to 256 bytes.
+        let row = (16 * width).next_multiple_of(256);
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: u64::from(row) * u64::from(height),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let texture = self.sums()[0].texture();
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None },
+            },
+            texture.size(),
+        );
+        gpu.queue.submit([encoder.finish()]);
+
+        let failed = |e: &dyn std::fmt::Display| Error::Gpu(format!("the picture cannot be read back: {e}"));
+        let (sender, receiver) = std::sync::mpsc::channel();
+        buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+            // The receiver waits below.
+            let _ = sender.send(result);
+        });
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(&e))?;
+        receiver.recv().map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
+        let view = buffer.slice(..).get_mapped_range().map_err(|e| failed(&e))?;
+        let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+        let pixel = |p: &[u8]| {
+            let [r, g, b, frames] = [0, 4, 8, 12].map(|at| number(&p[at..]));
+            [r, g, b].map(|c| c / frames)
+        };
+        let rows = view.chunks_exact(row as usize);
+        let pixels = rows.flat_map(|row| row[..16 * width as usize].chunks_exact(16).map(pixel)).collect();
+        Ok(Film { width, height, pixels })
+    }
+}

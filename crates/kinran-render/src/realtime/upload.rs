@@ -1,0 +1,281 @@
+//! A scene on the GPU.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::{Mat3, Vec3};
+use half::f16;
+use kinran_image::{Format, Texture, Transfer};
+use kinran_scene::{AlphaMode, Wrap};
+use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
+
+use super::{Gpu, Layouts, probe};
+use crate::reference::{BoundTexture, MipTexture, RenderMaterial, RenderScene};
+
+/// Floats of a vertex: position, normal, tangent, both UV sets, colour.
+pub(super) const VERTEX_FLOATS: usize = 3 + 3 + 4 + 4 + 4;
+
+/// Which pass draws a material.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Path {
+    Deferred,
+    Forward,
+    Blended,
+}
+
+/// Triangles of one material that lie one after the other.
+pub(super) struct Draw {
+    pub(super) material: usize,
+    pub(super) indices: std::ops::Range<u32>,
+    /// Middle, for sorting.
+    pub(super) middle: Vec3,
+}
+
+pub(super) struct Material {
+    pub(super) bind_group: wgpu::BindGroup,
+    pub(super) path: Path,
+    pub(super) double_sided: bool,
+}
+
+/// All that is drawn.
+pub struct GpuScene {
+    pub(super) vertices: wgpu::Buffer,
+    pub(super) indices: wgpu::Buffer,
+    pub(super) draws: Vec<Draw>,
+    pub(super) materials: Vec<Material>,
+    pub(super) environment: wgpu::TextureView,
+    pub(super) probe: wgpu::TextureView,
+    pub(super) scene: RenderScene,
+}
+
+/// Little-endian bytes.
+pub(super) fn bytes(floats: &[f32]) -> Vec<u8> {
+    floats.iter().flat_map(|f| f.to_le_bytes()).collect()
+}
+
+impl GpuScene {
+    pub(super) fn new(gpu: &Gpu, layouts: &Layouts, scene: &RenderScene) -> Self {
+        let buffer = |contents: &[u8], usage| {
+            gpu.device.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })
+        };
+
+        // Geometry, one draw for each run of triangles of the same material.
+        let geometry = &scene.geometry;
+        let mut vertices = Vec::with_capacity(geometry.positions.len() * VERTEX_FLOATS);
+        for i in 0..geometry.positions.len() {
+            vertices.extend(geometry.positions[i].to_array());
+            vertices.extend(geometry.normals[i].to_array());
+            vertices.extend(geometry.tangents[i].to_array());
+            vertices.extend(geometry.uvs[i].iter().flat_map(|uv| uv.to_array()));
+            vertices.extend(geometry.colors[i].to_array());
+        }
+        let indices: Vec<u8> = geometry.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
+        let mut draws: Vec<Draw> = Vec::new();
+        for run in (0..geometry.triangles.len()).collect::<Vec<_>>().chunk_by(|&a, &b| {
+            geometry.materials[a] == geometry.materials[b]
+        }) {
+            let corners = run.iter().flat_map(|&t| geometry.triangles[t]);
+            let sum: Vec3 = corners.map(|i| geometry.positions[i as usize]).sum();
+            draws.push(Draw {
+                material: geometry.materials[run[0]] as usize,
+                indices: 3 * run[0] as u32..3 * (run[run.len() - 1] + 1) as u32,
+                middle: sum / (3 * run.len()) as f32,
+            });
+        }
+
+        let mut textures = Textures { gpu, views: HashMap::new(), samplers: HashMap::new() };
+        let materials = scene.materials.iter().map(|m| material(&mut textures, layouts, m)).collect();
+        let (environment, probe) = surroundings(gpu, scene);
+        Self {
+            vertices: buffer(&bytes(&vertices), wgpu::BufferUsages::VERTEX),
+            indices: buffer(&indices, wgpu::BufferUsages::INDEX),
+            draws,
+            materials,
+            environment,
+            probe,
+            scene: scene.clone(),
+        }
+    }
+}
+
+/// The environment as it is, and filtered.
+fn surroundings(gpu: &Gpu, scene: &RenderScene) -> (wgpu::TextureView, wgpu::TextureView) {
+    let black = vec![vec![Vec3::ZERO]];
+    let Some(surroundings) = &scene.surroundings else {
+        let view = float_texture(gpu, (1, 1), &half_levels(&black));
+        return (view.clone(), view);
+    };
+    let environment = &surroundings.environment;
+    let (width, height) = (environment.width(), environment.height());
+    let texels = (0..height).flat_map(|y| (0..width).map(move |x| environment.texel(x, y))).collect();
+    let seen = float_texture(gpu, (width as u32, height as u32), &half_levels(&[texels]));
+    let levels = probe::prefilter(environment);
+    (seen, float_texture(gpu, (2 * probe::HEIGHT as u32, probe::HEIGHT as u32), &half_levels(&levels)))
+}
+
+fn half_levels(levels: &[Vec<Vec3>]) -> Vec<Vec<u8>> {
+    let texel = |c: &Vec3| c.extend(1.0).to_array().map(half).into_iter().flatten();
+    levels.iter().map(|level| level.iter().flat_map(texel).collect()).collect()
+}
+
+/// Bytes of a half float; what is larger than it holds becomes its largest number.
+fn half(x: f32) -> [u8; 2] {
+    f16::from_f32(x.clamp(-65504.0, 65504.0)).to_le_bytes()
+}
+
+fn create_texture(
+    gpu: &Gpu,
+    (width, height): (u32, u32),
+    format: wgpu::TextureFormat,
+    levels: &[impl AsRef<[u8]>],
+) -> wgpu::TextureView {
+    let descriptor = wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: levels.len() as u32,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    };
+    let data: Vec<u8> = levels.iter().flat_map(|level| level.as_ref()).copied().collect();
+    let texture = gpu.device.create_texture_with_data(&gpu.queue, &descriptor, TextureDataOrder::MipMajor, &data);
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+fn float_texture(gpu: &Gpu, size: (u32, u32), levels: &[Vec<u8>]) -> wgpu::TextureView {
+    create_texture(gpu, size, wgpu::TextureFormat::Rgba16Float, levels)
+}
+
+/// The reference's table of what grazing light reflects.
+pub(super) fn albedo_table(gpu: &Gpu) -> wgpu::TextureView {
+    use crate::reference::albedo::{GRAZING, SIZE};
+    let texels = GRAZING.iter().map(|&x| Vec3::splat(x)).collect();
+    float_texture(gpu, (SIZE as u32, SIZE as u32), &half_levels(&[texels]))
+}
+
+/// Textures and samplers, each uploaded once however many materials use it.
+struct Textures<'a> {
+    gpu: &'a Gpu,
+    /// By address of the texels, which the scene keeps alive.
+    views: HashMap<usize, wgpu::TextureView>,
+    samplers: HashMap<[Wrap; 2], wgpu::Sampler>,
+}
+
+impl Textures<'_> {
+    fn view(&mut self, texture: &Arc<MipTexture>) -> wgpu::TextureView {
+        let gpu = self.gpu;
+        let upload = || {
+            encoded(gpu, texture).unwrap_or_else(|| {
+                let texel = |t: &[f32; 4]| t.map(half).into_iter().flatten();
+                let levels: Vec<Vec<u8>> =
+                    texture.levels.iter().map(|level| level.texels.iter().flat_map(texel).collect()).collect();
+                float_texture(gpu, (texture.levels[0].width, texture.levels[0].height), &levels)
+            })
+        };
+        self.views.entry(Arc::as_ptr(texture) as usize).or_insert_with(upload).clone()
+    }
+
+    fn sampler(&mut self, wrap: [Wrap; 2]) -> wgpu::Sampler {
+        let mode = |wrap| match wrap {
+            Wrap::Repeat => wgpu::AddressMode::Repeat,
+            Wrap::Mirror => wgpu::AddressMode::MirrorRepeat,
+            Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
+        };
+        let create = || {
+            self.gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                address_mode_u: mode(wrap[0]),
+                address_mode_v: mode(wrap[1]),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                mipmap_filter: wgpu::MipmapFilterMode::Linear,
+                anisotropy_clamp: 16,
+                ..Default::default()
+            })
+        };
+        self.samplers.entry(wrap).or_insert_with(create).clone()
+    }
+}
+
+/// The blocks as they are, where the device reads them.
+fn encoded(gpu: &Gpu, texture: &MipTexture) -> Option<wgpu::TextureView> {
+    use wgpu::TextureFormat as F;
+    let encoded: &Texture = texture.encoded.as_ref()?;
+    let srgb = encoded.transfer == Transfer::Srgb;
+    let format = match (encoded.format, srgb) {
+        (Format::Bc1, false) => F::Bc1RgbaUnorm,
+        (Format::Bc1, true) => F::Bc1RgbaUnormSrgb,
+        (Format::Bc4, _) => F::Bc4RUnorm,
+        (Format::Bc5, _) => F::Bc5RgUnorm,
+        (Format::Bc7, false) => F::Bc7RgbaUnorm,
+        (Format::Bc7, true) => F::Bc7RgbaUnormSrgb,
+        (Format::Rgba8, false) => F::Rgba8Unorm,
+        (Format::Rgba8, true) => F::Rgba8UnormSrgb,
+        _ => return None,
+    };
+    let (width, height) = (encoded.levels[0].width, encoded.levels[0].height);
+    // WebGPU wants whole blocks on level 0.
+    let (columns, rows) = format.block_dimensions();
+    let readable = format.required_features() & !gpu.device.features() == wgpu::Features::empty();
+    let whole = width % columns == 0 && height % rows == 0;
+    let levels: Vec<&[u8]> = encoded.levels.iter().map(|level| level.data.as_slice()).collect();
+    (readable && whole).then(|| create_texture(gpu, (width, height), format, &levels))
+}
+
+fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> Material {
+    let white = BoundTexture::constant([1.0; 4]);
+    let surface = m.surface.as_ref();
+    let slots = [
+        surface.map_or(&white, |s| &s.normal),
+        surface.map_or(&white, |s| &s.aniso),
+        m.base_color.as_ref().unwrap_or(&white),
+        m.metallic_roughness.as_ref().unwrap_or(&white),
+        m.occlusion.as_ref().unwrap_or(&white),
+        m.emissive.as_ref().unwrap_or(&white),
+    ];
+
+    // The uniform, as surface.wgsl declares it.
+    let (mode, cutoff) = match m.alpha_mode {
+        AlphaMode::Opaque => (0, 0.0),
+        AlphaMode::Mask { cutoff } => (1, cutoff),
+        AlphaMode::Blend => (2, 0.0),
+    };
+    let mut floats = m.base_color_factor.to_array().to_vec();
+    floats.extend(m.emissive_factor.extend(m.occlusion_strength).to_array());
+    let transmissive = f32::from(u8::from(m.transmissive));
+    floats.extend([m.metallic_factor, m.roughness_factor, cutoff, transmissive]);
+    floats.extend([u32::from(surface.is_some()), mode, 0, 0].map(f32::from_bits));
+    for slot in slots {
+        let Mat3 { x_axis, y_axis, z_axis } = slot.transform;
+        floats.extend([x_axis.x, y_axis.x, z_axis.x, slot.uv_set as f32]);
+        floats.extend([x_axis.y, y_axis.y, z_axis.y, 0.0]);
+    }
+    let uniform = textures.gpu.device.create_buffer_init(&BufferInitDescriptor {
+        label: None,
+        contents: &bytes(&floats),
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+    });
+
+    let views = slots.map(|slot| textures.view(&slot.texture));
+    let samplers = slots.map(|slot| textures.sampler(slot.texture.wrap));
+    let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }];
+    let resources = (views.iter().map(wgpu::BindingResource::TextureView))
+        .chain(samplers.iter().map(wgpu::BindingResource::Sampler));
+    for (i, resource) in resources.enumerate() {
+        entries.push(wgpu::BindGroupEntry { binding: i as u32 + 1, resource });
+    }
+    let bind_group = textures.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &layouts.material,
+        entries: &entries,
+    });
+    let path = if m.alpha_mode == AlphaMode::Blend || m.transmissive {
+        Path::Blended
+    } else if surface.is_some() {
+        Path::Forward
+    } else {
+        Path::Deferred
+    };
+    Material { bind_group, path, double_sided: m.double_sided }
+}
