@@ -41,6 +41,10 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Backend::Cpu)]
     pub backend: Backend,
 
+    /// With --backend gpu: a folder whose .wgsl files take the place of the built-in ones of the same name
+    #[arg(long, value_name = "DIR")]
+    pub shaders: Option<PathBuf>,
+
     /// Samples in a pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub spp: u32,
@@ -111,7 +115,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let prepared = view.scene(&scene, surfaces)?;
     let film = match args.backend {
         Backend::Cpu => view.render(&prepared, "render", args.spp, filtering, &progress)?,
-        Backend::Gpu => gpu_film(&view, &prepared, args.spp, &progress)?,
+        Backend::Gpu => gpu_film(&view, &prepared, args, &progress)?,
     };
     if outputs::has_extension(&args.output, "exr") {
         let pixels = Pixels::F32(film.pixels.into_flattened());
@@ -142,19 +146,20 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
 }
 
 #[cfg(feature = "gpu")]
-fn gpu_film(view: &View, scene: &RenderScene, samples: u32, progress: &Progress) -> Result<Film, Error> {
+fn gpu_film(view: &View, scene: &RenderScene, args: &Args, progress: &Progress) -> Result<Film, Error> {
     use kinran_render::realtime::{Gpu, Realtime, Settings, ShaderSource};
     let gpu = Gpu::open()?;
+    let source = ShaderSource { folder: args.shaders.clone() };
     // Nothing is shown on a display, so any format will do.
-    let renderer = Realtime::new(&gpu, &ShaderSource::default(), wgpu::TextureFormat::Rgba8Unorm)?;
+    let renderer = Realtime::new(&gpu, &source, wgpu::TextureFormat::Rgba8Unorm)?;
     let scene = renderer.load(scene);
     let settings = Settings { shadows: view.shadows, background: view.background, ..Settings::default() };
-    let stage = progress.stage("render", u64::from(samples));
-    Ok(renderer.film(&scene, &view.camera, &settings, view.size, samples, &|_, _| stage.add(1))?)
+    let stage = progress.stage("render", u64::from(args.spp));
+    Ok(renderer.film(&scene, &view.camera, &settings, view.size, args.spp, &|_, _| stage.add(1))?)
 }
 
 #[cfg(not(feature = "gpu"))]
-fn gpu_film(_: &View, _: &RenderScene, _: u32, _: &Progress) -> Result<Film, Error> {
+fn gpu_film(_: &View, _: &RenderScene, _: &Args, _: &Progress) -> Result<Film, Error> {
     Err(Error::Internal("a build without a GPU renderer was asked for one".into()))
 }
 

@@ -24,7 +24,7 @@ struct Frame {
     background: vec4f,
     // Irradiance of the environment.
     irradiance: array<vec4f, 9>,
-    // x lights, y levels of the probe (0: no environment), z the view shown, w samples of shadows.
+    // x lights, y levels of the probe (0: no environment), z the channel shown, w the frame.
     counts: vec4u,
     // xy size in pixels, z exposure factor, w tone curve.
     display: vec4f,

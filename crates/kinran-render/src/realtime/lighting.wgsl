@@ -120,9 +120,10 @@ fn specular_isotropic(surface: Surface, lobe: Lobe, u: vec3f) -> vec3f {
     return d * visibility * schlick_f(lobe.base_reflectance, dot(lobe.v, h)) * lobe.compensation;
 }
 
-// Light from all around, diffuse by spherical harmonics, specular by a fan of probe lookups: an anisotropic lobe is
-// a round one of the smaller roughness, smeared along the direction of the larger. Its slopes along that direction are
-// Student-t distributed; `taps` quantiles of it, weighted as visible normals are, stand for them.
+// Light from all around, diffuse by spherical harmonics, specular by a fan of probe lookups: `taps` quantiles of the
+// lobe's slopes along its rougher direction, which are Student-t distributed, weighted as visible normals are. Across,
+// given a slope, they are Student-t too, wider where the slope is steep; the probe's round lobe of the same quartiles
+// stands for that. Frames shift the quantiles, so that their mean is a continuous fan.
 fn ambient(surface: Surface, lobe: Lobe, taps: u32) -> vec3f {
     if frame.counts.y == 0u {
         return vec3f(0.0);
@@ -133,23 +134,26 @@ fn ambient(surface: Surface, lobe: Lobe, taps: u32) -> vec3f {
     }
     let diffuse = lobe.diffuse / PI * max(sh_evaluate(coefficients, surface.normal), vec3f(0.0));
 
-    let spread = sqrt(max(surface.alpha_t * surface.alpha_t - surface.alpha_b * surface.alpha_b, 0.0));
-    let count = select(taps, 1u, spread < 0.02);
+    // 0 where the lobe is round, towards 1 where it is a line.
+    let ratio = surface.alpha_b / surface.alpha_t;
+    let stretch_sqr = saturate(1.0 - ratio * ratio);
+    let spread = surface.alpha_t * sqrt(stretch_sqr);
+    let count = select(taps, 1u, stretch_sqr < 0.01);
+    let shift = select(fract(0.5 + f32(frame.counts.w) * 0.618034), 0.5, count == 1u);
     let to_world = mat3x3f(surface.tangent, surface.bitangent, surface.normal);
-    let roughness = sqrt(surface.alpha_b);
     var sum = vec3f(0.0);
     var weights = 0.0;
     for (var i = 0u; i < count; i++) {
-        let p = (2.0 * f32(i) + 1.0) / f32(count) - 1.0;
-        let slope = spread * p * inverseSqrt(1.0 - p * p);
-        let h = normalize(vec3f(-slope, 0.0, 1.0));
+        let p = 2.0 * (f32(i) + shift) / f32(count) - 1.0;
+        let quantile = p * inverseSqrt(max(1.0 - p * p, 1e-4));
+        let h = normalize(vec3f(-spread * quantile, 0.0, 1.0));
         let v_h = dot(lobe.v, h);
         let u = 2.0 * v_h * h - lobe.v;
         let weight = max(v_h, 0.0) / h.z * saturate(u.z * 16.0 + 0.5);
+        let alpha = min(surface.alpha_b * mix(1.0, 0.765 * sqrt(1.0 + quantile * quantile), stretch_sqr), 1.0);
         // A rough lobe leans from the mirror direction towards its normal (Lagarde, de Rousiers 2014).
-        let alpha = surface.alpha_b;
         let lean = (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha);
-        sum += weight * probe(normalize(to_world * mix(h, u, lean)), roughness);
+        sum += weight * probe(normalize(to_world * mix(h, u, lean)), sqrt(alpha));
         weights += weight;
     }
     let specular = sum / max(weights, 1e-6) * lobe.albedo;

@@ -339,7 +339,7 @@ impl Realtime {
         floats.extend(irradiance.iter().flat_map(|c| c.extend(0.0).to_array()));
         let lights = &scene.lights[..scene.lights.len().min(MAX_LIGHTS)];
         let levels = if scene.surroundings.is_some() { probe::LEVELS as u32 } else { 0 };
-        let counts = [lights.len() as u32, levels, settings.channel as u32, 0];
+        let counts = [lights.len() as u32, levels, settings.channel as u32, target.frames];
         floats.extend(counts.map(f32::from_bits));
         let curve = match settings.tonemap {
             Tonemap::None => 0.0,
