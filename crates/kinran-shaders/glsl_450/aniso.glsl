@@ -26,17 +26,23 @@ struct AnisoDecoded {
 const float ALPHA_MIN = 0.003921569;
 
 /// GGX alpha of a perceptual roughness in [0, 1]: its square, at least ALPHA_MIN.
+///
+/// Cost on GCN: 2 instructions.
 float alpha_from_roughness(float roughness) {
     return max((roughness * roughness), ALPHA_MIN);
 }
 
 /// GGX alpha of a gloss in [0, 1]: `(1 - gloss)²`, at least ALPHA_MIN.
+///
+/// Cost on GCN: 3 instructions.
 float alpha_from_gloss(float gloss) {
     float _e3 = alpha_from_roughness((1.0 - gloss));
     return _e3;
 }
 
 /// Texel of a squared roughness matrix `s` (xx, xy, yy); each component in [0, 1]. rho is 0 where Sxx or Syy is 0.
+///
+/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 vec3 aniso_encode(vec3 s) {
     float product = (s.x * s.z);
     float rho = ((product > 0.0) ? clamp((s.y * inversesqrt(product)), -1.0, 1.0) : 0.0);
@@ -47,6 +53,8 @@ vec3 aniso_encode(vec3 s) {
 ///
 /// With `ggx_matrix_d` and `smith_matrix_v` this is all the decoding a light needs: cheaper than `aniso_decode` for a
 /// few lights. Add `sym2_clamp_eigen` where a determinant of zero would divide.
+///
+/// Cost on GCN: 5 instructions.
 vec3 aniso_decode_matrix(vec3 texel) {
     return vec3((texel.x * texel.x), ((texel.x * ((texel.y * 2.0) - 1.0)) * texel.z), (texel.z * texel.z));
 }
@@ -58,20 +66,22 @@ vec3 aniso_decode_matrix(vec3 texel) {
 /// slide's half difference cancels. And Sxy = 0 counts as positive: with HLSL's `sign`, which is zero there, the
 /// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
 /// 0.03° of the exact one.
+///
+/// Cost on GCN: 36 instructions (5 at a quarter of the rate).
 AnisoDecoded aniso_decode(vec3 texel, vec3 tangent, vec3 bitangent) {
     float rho = ((texel.y * 2.0) - 1.0);
     float product = (texel.x * texel.z);
     float sxy = (product * rho);
     float sxx = ((texel.x * texel.x) + 1e-12);
     float syy = (texel.z * texel.z);
-    float difference = (sxx - syy);
-    float discr_sqr = ((difference * difference) + ((4.0 * sxy) * sxy));
+    float half_difference = (0.5 * (sxx - syy));
+    float discr_sqr = (4.0 * ((half_difference * half_difference) + (sxy * sxy)));
     float discr_rcp = inversesqrt(discr_sqr);
     float alpha_t_sqr = (0.5 * ((sxx + syy) + (discr_sqr * discr_rcp)));
     float alpha_t_rcp = inversesqrt(alpha_t_sqr);
     float alpha_t = (alpha_t_sqr * alpha_t_rcp);
     float alpha_b = ((product * sqrt((1.0 - (rho * rho)))) * alpha_t_rcp);
-    float c_sqr = clamp((((0.5 * difference) * discr_rcp) + 0.5), 0.0, 1.0);
+    float c_sqr = clamp(((half_difference * discr_rcp) + 0.5), 0.0, 1.0);
     float c = sqrt(c_sqr);
     float s_abs = sqrt((1.0 - c_sqr));
     float s = ((sxy < 0.0) ? -(s_abs) : s_abs);
@@ -80,6 +90,8 @@ AnisoDecoded aniso_decode(vec3 texel, vec3 tangent, vec3 bitangent) {
 
 /// Squared roughness matrix (xx, xy, yy) with `alpha_t` along the unit vector `axis` of the `m_n` frame, `alpha_b`
 /// across.
+///
+/// Cost on GCN: 13 instructions.
 vec3 aniso_from_alphas(float alpha_t, float alpha_b, vec2 axis) {
     vec3 _e5 = sym2_from_eigen((alpha_t * alpha_t), (alpha_b * alpha_b), axis);
     return _e5;
@@ -87,6 +99,8 @@ vec3 aniso_from_alphas(float alpha_t, float alpha_b, vec2 axis) {
 
 /// Direction in the `m_n` frame of a direction painted in the mesh's tangent plane: what Gram–Schmidt, `d - (d·n) n`,
 /// makes of it. Both are unit vectors; where nothing is left of it, the direction stays as it is.
+///
+/// Cost on GCN: 23 instructions (2 at a quarter of the rate).
 vec2 axis_from_direction(vec2 direction, vec3 n) {
     mat3x3 _e2 = m_n(n);
     vec2 axis = vec2(dot(_e2[0].xy, direction), dot(_e2[1].xy, direction));
@@ -96,6 +110,8 @@ vec2 axis_from_direction(vec2 direction, vec3 n) {
 
 /// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
 /// turns into `axis` of the `m_n` frame.
+///
+/// Cost on GCN: 31 instructions (2 at a quarter of the rate).
 vec2 direction_from_axis(vec2 axis, vec3 n) {
     mat3x3 _e2 = m_n(n);
     vec3 t = ((_e2[0] * axis.x) + (_e2[1] * axis.y));
@@ -106,6 +122,8 @@ vec2 direction_from_axis(vec2 axis, vec3 n) {
 
 /// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
 /// `alpha_t = mix(alpha_b, 1, strength²)`.
+///
+/// Cost on GCN: 5 instructions.
 vec2 alphas_from_khr_anisotropy(float roughness, float strength) {
     float _e2 = alpha_from_roughness(roughness);
     return vec2((_e2 + (((1.0 - _e2) * strength) * strength)), _e2);
@@ -113,6 +131,8 @@ vec2 alphas_from_khr_anisotropy(float roughness, float strength) {
 
 /// Perceptual roughness and anisotropy strength of `KHR_materials_anisotropy` for `alpha_t ≥ alpha_b`; the inverse of
 /// `alphas_from_khr_anisotropy`.
+///
+/// Cost on GCN: 8 instructions (3 at a quarter of the rate).
 vec2 khr_anisotropy_from_alphas(float alpha_t, float alpha_b) {
     float rest = (1.0 - alpha_b);
     float strength = ((rest > 0.0) ? sqrt(clamp(((alpha_t - alpha_b) / rest), 0.0, 1.0)) : 0.0);

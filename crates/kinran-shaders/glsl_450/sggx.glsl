@@ -27,6 +27,8 @@ struct SlopeDistribution {
 
 /// `S = M_n [A 0; 0 1] M_n^T` (slide: Our Algorithm, step 1): the SGGX matrix of a GGX surface with unit normal `n`
 /// and squared roughness matrix `a` (xx, xy, yy) in the frame of `m_n`.
+///
+/// Cost on GCN: 51 instructions (1 at a quarter of the rate).
 mat3x3 sggx_from_ggx(vec3 n, vec3 a) {
     mat3x3 _e2 = m_n(n);
     vec3 ax = ((_e2[0] * a.x) + (_e2[1] * a.y));
@@ -35,6 +37,8 @@ mat3x3 sggx_from_ggx(vec3 n, vec3 a) {
 }
 
 /// Area of the microflakes projected along the unit vector `w`: `sqrt(w^T S w)` (Heitz 2015).
+///
+/// Cost on GCN: 14 instructions (1 at a quarter of the rate).
 float sggx_projected_area(mat3x3 s, vec3 w) {
     float _e2 = sym3_quadratic(s, w);
     return sqrt(max(_e2, 0.0));
@@ -43,6 +47,8 @@ float sggx_projected_area(mat3x3 s, vec3 w) {
 /// Distribution of microflake normals at the unit vector `h`, a density per steradian over the sphere:
 /// `1 / (π sqrt|S| (h^T S^-1 h)^2)` (Heitz 2015), written as `|S|^(3/2) / (π (h^T adj(S) h)^2)`. `s` must have a
 /// positive determinant. Single precision leaves a relative error of 1e-5 over the smallest eigenvalue.
+///
+/// Cost on GCN: 39 instructions (2 at a quarter of the rate).
 float sggx_d(mat3x3 s, vec3 h) {
     float _e2 = sym3_det(s);
     mat3x3 _e3 = sym3_adjugate(s);
@@ -52,6 +58,8 @@ float sggx_d(mat3x3 s, vec3 h) {
 
 /// The slope distribution an SGGX matrix with zz > 0 stands for, seen from the z axis: `S / S_zz = [A + m m^T, m;
 /// m^T, 1]`. The slopes follow a bivariate Student-t with two degrees of freedom.
+///
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 SlopeDistribution slopes_from_sggx(mat3x3 s) {
     float inv = (1.0 / s[2].z);
     vec2 m = (s[2].xy * inv);
@@ -60,6 +68,8 @@ SlopeDistribution slopes_from_sggx(mat3x3 s) {
 }
 
 /// The SGGX matrix with zz = 1 of a slope distribution; the inverse of `slopes_from_sggx`.
+///
+/// Cost on GCN: 3 instructions.
 mat3x3 sggx_from_slopes(vec2 m, vec3 a) {
     float xy = (a.y + (m.x * m.y));
     return mat3x3(vec3((a.x + (m.x * m.x)), xy, m.x), vec3(xy, (a.z + (m.y * m.y)), m.y), vec3(m, 1.0));
@@ -68,6 +78,8 @@ mat3x3 sggx_from_slopes(vec2 m, vec3 a) {
 /// The talk's power iteration (slide: Our Algorithm, step 3): `steps` times `n = S n / |S n|` from `start`. The
 /// tangent of the error shrinks by the ratio of the two largest eigenvalues a step; in V grooves steeper than 45° it
 /// leaves the surface for its walls. `sggx_principal_axis` has neither fault.
+///
+/// Cost on GCN: 34 instructions (2 at a quarter of the rate), one round of its loop.
 vec3 sggx_power_iteration(mat3x3 s, vec3 start, uint steps) {
     vec3 n = vec3(0.0);
     uint i = 0u;
@@ -99,6 +111,8 @@ vec3 sggx_power_iteration(mat3x3 s, vec3 start, uint steps) {
 }
 
 /// Squared overlap with the eigenvector of `l`, from the moments m' B m and |B m|² of a deviator of unit size.
+///
+/// Cost on GCN: 7 instructions (1 at a quarter of the rate).
 float sggx_overlap(float l, float moment, float moment_sqr) {
     return ((((moment_sqr + (l * moment)) + (l * l)) - 3.0) / (((3.0 * l) * l) - 3.0));
 }
@@ -107,6 +121,8 @@ float sggx_overlap(float l, float moment, float moment_sqr) {
 /// Started at the mean normal of a footprint it finds the filtered normal, also where the largest eigenvalue is
 /// another one (V grooves steeper than 45°). Where eigenvalues coincide, to 0.1 % of their spread, it is the
 /// projection of `start` on their space; `start` itself if `s` is a multiple of the identity. No trigonometry.
+///
+/// Cost on GCN: 204 instructions (10 at a quarter of the rate).
 vec3 sggx_principal_axis(mat3x3 s, vec3 start) {
     bool local_2 = false;
     bool local_3 = false;
@@ -164,6 +180,8 @@ vec3 sggx_principal_axis(mat3x3 s, vec3 start) {
 }
 
 /// `ggx_from_sggx` before the clamp of the roughness.
+///
+/// Cost on GCN: 268 instructions (12 at a quarter of the rate).
 GgxSurface ggx_from_sggx_unclamped(mat3x3 s, vec3 mean_normal) {
     vec3 _e2 = sggx_principal_axis(s, mean_normal);
     vec3 n = ((_e2.z < 0.0) ? -(_e2) : _e2);
@@ -178,6 +196,8 @@ GgxSurface ggx_from_sggx_unclamped(mat3x3 s, vec3 mean_normal) {
 /// Normal and squared roughness matrix of a filtered SGGX matrix (slide: Our Algorithm, step 3). `mean_normal`, a unit
 /// vector, picks the eigenvector as in `sggx_principal_axis`. The normal returned has z ≥ 0, eigenvalues of the
 /// roughness lie in [0, 1]: a microsurface rougher than alpha = 1 is clamped, because no texture can hold it.
+///
+/// Cost on GCN: 321 instructions (17 at a quarter of the rate).
 GgxSurface ggx_from_sggx(mat3x3 s, vec3 mean_normal) {
     GgxSurface _e2 = ggx_from_sggx_unclamped(s, mean_normal);
     vec3 _e7 = sym2_clamp_eigen(_e2.a, 0.0, 1.0);

@@ -16,26 +16,36 @@ struct SymEigen {
 };
 
 /// The 2×2 matrix with eigenvalue `l1` along the unit vector `axis` and `l2` across it.
+///
+/// Cost on GCN: 11 instructions.
 vec3 sym2_from_eigen(float l1_, float l2_, vec2 axis) {
     return vec3((((l1_ * axis.x) * axis.x) + ((l2_ * axis.y) * axis.y)), (((l1_ - l2_) * axis.x) * axis.y), (((l1_ * axis.y) * axis.y) + ((l2_ * axis.x) * axis.x)));
 }
 
 /// `v v^T`.
+///
+/// Cost on GCN: 3 instructions.
 vec3 sym2_outer(vec2 v) {
     return vec3((v.x * v.x), (v.x * v.y), (v.y * v.y));
 }
 
 /// Determinant of a 2×2 matrix.
+///
+/// Cost on GCN: 2 instructions.
 float sym2_det(vec3 a) {
     return ((a.x * a.z) - (a.y * a.y));
 }
 
 /// Trace of a 2×2 matrix.
+///
+/// Cost on GCN: 1 instruction.
 float sym2_trace(vec3 a) {
     return (a.x + a.z);
 }
 
 /// `v^T A v`.
+///
+/// Cost on GCN: 7 instructions.
 float sym2_quadratic(vec3 a, vec2 v) {
     return ((((a.x * v.x) * v.x) + (((2.0 * a.y) * v.x) * v.y)) + ((a.z * v.y) * v.y));
 }
@@ -43,6 +53,8 @@ float sym2_quadratic(vec3 a, vec2 v) {
 /// Eigenvalues and axis of a positive semi-definite matrix, both at least zero. The axis has x ≥ 0 (and y = +1
 /// where x = 0) and is (1, 0) when both eigenvalues are equal. The smaller is `det / larger`, which keeps its digits
 /// where the textbook's half difference cancels.
+///
+/// Cost on GCN: 33 instructions (5 at a quarter of the rate).
 SymEigen sym2_eigen(vec3 a) {
     bool local = false;
     float half_difference = (0.5 * (a.x - a.z));
@@ -68,6 +80,8 @@ SymEigen sym2_eigen(vec3 a) {
 
 /// The same eigenvectors with both eigenvalues clamped to `[lo, hi]`, `lo` ≥ 0. A matrix within the range comes back
 /// as it is.
+///
+/// Cost on GCN: 54 instructions (5 at a quarter of the rate).
 vec3 sym2_clamp_eigen(vec3 a, float lo, float hi) {
     bool local = false;
     SymEigen _e3 = sym2_eigen(a);
@@ -83,6 +97,8 @@ vec3 sym2_clamp_eigen(vec3 a, float lo, float hi) {
 
 /// The positive semi-definite square root of a positive semi-definite matrix:
 /// `(A + sqrt(det) I) / sqrt(trace + 2 sqrt(det))`, by Cayley–Hamilton.
+///
+/// Cost on GCN: 17 instructions (3 at a quarter of the rate).
 vec3 sym2_sqrt(vec3 a) {
     float _e1 = sym2_det(a);
     float root_det = sqrt(max(_e1, 0.0));
@@ -95,21 +111,29 @@ vec3 sym2_sqrt(vec3 a) {
 }
 
 /// `v^T A v`.
+///
+/// Cost on GCN: 12 instructions.
 float sym3_quadratic(mat3x3 a, vec3 v) {
     return dot(v, (a * v));
 }
 
 /// Trace of a 3×3 matrix.
+///
+/// Cost on GCN: 2 instructions.
 float sym3_trace(mat3x3 a) {
     return ((a[0].x + a[1].y) + a[2].z);
 }
 
 /// The adjugate of a symmetric matrix: `A adj(A) = det(A) I`. Its columns are the cross products of A's.
+///
+/// Cost on GCN: 18 instructions.
 mat3x3 sym3_adjugate(mat3x3 a) {
     return mat3x3(cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]));
 }
 
 /// Determinant of a symmetric 3×3 matrix.
+///
+/// Cost on GCN: 9 instructions.
 float sym3_det(mat3x3 a) {
     return dot(a[0], cross(a[1], a[2]));
 }

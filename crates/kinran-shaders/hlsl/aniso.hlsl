@@ -18,24 +18,24 @@
 struct AnisoDecoded {
     float alpha_t;
     float alpha_b;
-    int _pad2_0;
-    int _pad2_1;
     float3 tangent;
-    int _pad3_0;
     float3 bitangent;
-    int _end_pad_0;
 };
 
 /// Smallest GGX roughness to shade with: one step of an 8-bit aniso channel.
 static const float ALPHA_MIN = 0.003921569;
 
 /// GGX alpha of a perceptual roughness in [0, 1]: its square, at least ALPHA_MIN.
+///
+/// Cost on GCN: 2 instructions.
 float alpha_from_roughness(float roughness)
 {
     return max((roughness * roughness), ALPHA_MIN);
 }
 
 /// GGX alpha of a gloss in [0, 1]: `(1 - gloss)²`, at least ALPHA_MIN.
+///
+/// Cost on GCN: 3 instructions.
 float alpha_from_gloss(float gloss)
 {
     const float _e3 = alpha_from_roughness((1.0 - gloss));
@@ -43,6 +43,8 @@ float alpha_from_gloss(float gloss)
 }
 
 /// Texel of a squared roughness matrix `s` (xx, xy, yy); each component in [0, 1]. rho is 0 where Sxx or Syy is 0.
+///
+/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 float3 aniso_encode(float3 s)
 {
     float product = (s.x * s.z);
@@ -54,6 +56,8 @@ float3 aniso_encode(float3 s)
 ///
 /// With `ggx_matrix_d` and `smith_matrix_v` this is all the decoding a light needs: cheaper than `aniso_decode` for a
 /// few lights. Add `sym2_clamp_eigen` where a determinant of zero would divide.
+///
+/// Cost on GCN: 5 instructions.
 float3 aniso_decode_matrix(float3 texel)
 {
     return float3((texel.x * texel.x), ((texel.x * ((texel.y * 2.0) - 1.0)) * texel.z), (texel.z * texel.z));
@@ -78,6 +82,8 @@ AnisoDecoded ConstructAnisoDecoded(float arg0, float arg1, float3 arg2, float3 a
 /// slide's half difference cancels. And Sxy = 0 counts as positive: with HLSL's `sign`, which is zero there, the
 /// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
 /// 0.03° of the exact one.
+///
+/// Cost on GCN: 36 instructions (5 at a quarter of the rate).
 AnisoDecoded aniso_decode(float3 texel, float3 tangent, float3 bitangent)
 {
     float rho = ((texel.y * 2.0) - 1.0);
@@ -85,14 +91,14 @@ AnisoDecoded aniso_decode(float3 texel, float3 tangent, float3 bitangent)
     float sxy = (product * rho);
     float sxx = ((texel.x * texel.x) + 1e-12);
     float syy = (texel.z * texel.z);
-    float difference = (sxx - syy);
-    float discr_sqr = ((difference * difference) + ((4.0 * sxy) * sxy));
+    float half_difference = (0.5 * (sxx - syy));
+    float discr_sqr = (4.0 * ((half_difference * half_difference) + (sxy * sxy)));
     float discr_rcp = rsqrt(discr_sqr);
     float alpha_t_sqr = (0.5 * ((sxx + syy) + (discr_sqr * discr_rcp)));
     float alpha_t_rcp = rsqrt(alpha_t_sqr);
     float alpha_t = (alpha_t_sqr * alpha_t_rcp);
     float alpha_b = ((product * sqrt((1.0 - (rho * rho)))) * alpha_t_rcp);
-    float c_sqr = saturate((((0.5 * difference) * discr_rcp) + 0.5));
+    float c_sqr = saturate(((half_difference * discr_rcp) + 0.5));
     float c = sqrt(c_sqr);
     float s_abs = sqrt((1.0 - c_sqr));
     float s = ((sxy < 0.0) ? -(s_abs) : s_abs);
@@ -102,6 +108,8 @@ AnisoDecoded aniso_decode(float3 texel, float3 tangent, float3 bitangent)
 
 /// Squared roughness matrix (xx, xy, yy) with `alpha_t` along the unit vector `axis` of the `m_n` frame, `alpha_b`
 /// across.
+///
+/// Cost on GCN: 13 instructions.
 float3 aniso_from_alphas(float alpha_t, float alpha_b, float2 axis)
 {
     const float3 _e5 = sym2_from_eigen((alpha_t * alpha_t), (alpha_b * alpha_b), axis);
@@ -110,6 +118,8 @@ float3 aniso_from_alphas(float alpha_t, float alpha_b, float2 axis)
 
 /// Direction in the `m_n` frame of a direction painted in the mesh's tangent plane: what Gram–Schmidt, `d - (d·n) n`,
 /// makes of it. Both are unit vectors; where nothing is left of it, the direction stays as it is.
+///
+/// Cost on GCN: 23 instructions (2 at a quarter of the rate).
 float2 axis_from_direction(float2 direction, float3 n)
 {
     const float3x3 _e2 = m_n(n);
@@ -120,6 +130,8 @@ float2 axis_from_direction(float2 direction, float3 n)
 
 /// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
 /// turns into `axis` of the `m_n` frame.
+///
+/// Cost on GCN: 31 instructions (2 at a quarter of the rate).
 float2 direction_from_axis(float2 axis, float3 n)
 {
     const float3x3 _e2 = m_n(n);
@@ -131,6 +143,8 @@ float2 direction_from_axis(float2 axis, float3 n)
 
 /// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
 /// `alpha_t = mix(alpha_b, 1, strength²)`.
+///
+/// Cost on GCN: 5 instructions.
 float2 alphas_from_khr_anisotropy(float roughness, float strength)
 {
     const float _e2 = alpha_from_roughness(roughness);
@@ -139,6 +153,8 @@ float2 alphas_from_khr_anisotropy(float roughness, float strength)
 
 /// Perceptual roughness and anisotropy strength of `KHR_materials_anisotropy` for `alpha_t ≥ alpha_b`; the inverse of
 /// `alphas_from_khr_anisotropy`.
+///
+/// Cost on GCN: 8 instructions (3 at a quarter of the rate).
 float2 khr_anisotropy_from_alphas(float alpha_t, float alpha_b)
 {
     float rest = (1.0 - alpha_b);

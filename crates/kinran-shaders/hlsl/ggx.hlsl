@@ -24,6 +24,8 @@ static const float FRAC_1_PI = 0.31830987;
 
 /// Isotropic distribution of microfacet normals per steradian, `n_h = n·h` (Walter 2007, eq. 33). One ulp of `n_h`
 /// moves the peak by `2.4e-7 / alpha²`; where that matters, `ggx_aniso_d` has all the digits.
+///
+/// Cost on GCN: 10 instructions (1 at a quarter of the rate).
 float ggx_d(float n_h, float alpha)
 {
     float a_sqr = (alpha * alpha);
@@ -33,6 +35,8 @@ float ggx_d(float n_h, float alpha)
 
 /// Anisotropic distribution of microfacet normals per steradian (slide: Our Algorithm, the form with
 /// `(alpha_t alpha_b)^3`), for `h` in the upper hemisphere. Its integral against n·h over there is one.
+///
+/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
 float ggx_aniso_d(float3 h, float alpha_t, float alpha_b)
 {
     float alpha_tb = (alpha_t * alpha_b);
@@ -43,6 +47,8 @@ float ggx_aniso_d(float3 h, float alpha_t, float alpha_b)
 
 /// `ggx_aniso_d` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode:
 /// `|A|^(3/2) / (π (h.xy^T adj(A) h.xy + |A| h.z²)²)`. `|A|` must be positive.
+///
+/// Cost on GCN: 17 instructions (2 at a quarter of the rate).
 float ggx_matrix_d(float3 h, float3 a)
 {
     const float _e2 = sym2_det(a);
@@ -53,12 +59,16 @@ float ggx_matrix_d(float3 h, float3 a)
 
 /// Visibility from the two terms of `2 n·u n·v (1 + Λ(u) + Λ(v))`: `n·v |u'|` and `n·u |v'|`, where the prime
 /// stretches a direction by the roughness. Finite, and meaningless, where both directions graze.
+///
+/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 float smith_v_of_terms(float u, float v)
 {
     return (0.5 / max((u + v), MIN_POSITIVE));
 }
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, isotropic (Heitz 2014, eq. 99).
+///
+/// Cost on GCN: 12 instructions (3 at a quarter of the rate).
 float smith_v(float n_u, float n_v, float alpha)
 {
     float a_sqr = (alpha * alpha);
@@ -70,6 +80,8 @@ float smith_v(float n_u, float n_v, float alpha)
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, anisotropic (Heitz 2014, eq. 99 with the lambda of section
 /// 5.3). `u` and `v` lie in the upper hemisphere.
+///
+/// Cost on GCN: 16 instructions (3 at a quarter of the rate).
 float smith_aniso_v(float3 u, float3 v, float alpha_t, float alpha_b)
 {
     float3 stretch = float3(alpha_t, alpha_b, 1.0);
@@ -78,6 +90,8 @@ float smith_aniso_v(float3 u, float3 v, float alpha_t, float alpha_b)
 }
 
 /// `smith_aniso_v` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode.
+///
+/// Cost on GCN: 21 instructions (3 at a quarter of the rate).
 float smith_matrix_v(float3 u, float3 v, float3 a)
 {
     const float _e4 = sym2_quadratic(a, u.xy);
@@ -89,12 +103,16 @@ float smith_matrix_v(float3 u, float3 v, float3 a)
 }
 
 /// Smith masking of `v` alone, 0 to 1 (Heitz 2014, eq. 43).
+///
+/// Cost on GCN: 10 instructions (2 at a quarter of the rate).
 float smith_aniso_g1(float3 v, float alpha_t, float alpha_b)
 {
     return ((2.0 * v.z) / (v.z + length((v * float3(alpha_t, alpha_b, 1.0)))));
 }
 
 /// Fresnel reflectance by Schlick's approximation (1994) from `f0` at normal incidence to one at grazing.
+///
+/// Cost on GCN: 10 instructions.
 float3 schlick_f(float3 f0_1, float v_h)
 {
     float m = saturate((1.0 - v_h));
@@ -104,14 +122,16 @@ float3 schlick_f(float3 f0_1, float v_h)
 
 /// A microfacet normal distributed as `ggx_vndf_pdf` for the view direction `v`, from two uniform numbers in [0, 1)
 /// (Dupuy, Benyoub 2023, listing 3).
+///
+/// Cost on GCN: 32 instructions (5 at a quarter of the rate).
 float3 ggx_vndf_sample(float3 v, float alpha_t, float alpha_b, float2 xi)
 {
     float3 stretch = float3(alpha_t, alpha_b, 1.0);
     float3 v_std = normalize((v * stretch));
     float phi = (6.2831855 * xi.x);
-    float z_1 = (((1.0 - xi.y) * (1.0 + v_std.z)) - v_std.z);
-    float sin_theta = sqrt(max((1.0 - (z_1 * z_1)), 0.0));
-    float3 cap = float3((sin_theta * cos(phi)), (sin_theta * sin(phi)), z_1);
+    float z = (((1.0 - xi.y) * (1.0 + v_std.z)) - v_std.z);
+    float sin_theta = sqrt(max((1.0 - (z * z)), 0.0));
+    float3 cap = float3((sin_theta * cos(phi)), (sin_theta * sin(phi)), z);
     float3 h = ((cap + v_std) * stretch);
     float length_squared = dot(h, h);
     return ((length_squared > 0.0) ? (h * rsqrt(length_squared)) : float3(0.0, 0.0, 1.0));
@@ -119,6 +139,8 @@ float3 ggx_vndf_sample(float3 v, float alpha_t, float alpha_b, float2 xi)
 
 /// Density per steradian of microfacet normals visible from `v`: `G1(v) max(v·h, 0) D(h) / n·v` (Heitz 2014, eq. 16).
 /// Divide by `4 v·h` for the density of the reflected direction.
+///
+/// Cost on GCN: 29 instructions (3 at a quarter of the rate).
 float ggx_vndf_pdf(float3 v, float3 h, float alpha_t, float alpha_b)
 {
     if ((h.z <= 0.0)) {

@@ -12,12 +12,16 @@
 
 /// Beckmann's sigma, the standard deviation of slopes, that stands for a GGX alpha (slide: LEAN Mapping):
 /// `alpha / sqrt(2)`.
+///
+/// Cost on GCN: 1 instruction.
 float sigma_from_alpha(float alpha)
 {
     return (alpha * 0.70710677);
 }
 
 /// The inverse of `sigma_from_alpha`.
+///
+/// Cost on GCN: 1 instruction.
 float alpha_from_sigma(float sigma)
 {
     return (sigma * 1.4142135);
@@ -25,24 +29,30 @@ float alpha_from_sigma(float sigma)
 
 /// Distribution of microfacet normals per steradian with slope deviations `sigma_t`, `sigma_b` along x and y
 /// (Beckmann 1963): `exp(-(x²/σt² + y²/σb²) / (2 z²)) / (2π σt σb z⁴)`, zero below the horizon.
+///
+/// Cost on GCN: 20 instructions (5 at a quarter of the rate).
 float beckmann_aniso_d(float3 h, float sigma_t, float sigma_b)
 {
     if ((h.z <= 1e-6)) {
         return 0.0;
     }
     float z_sqr = (h.z * h.z);
-    float x_1 = (h.x / sigma_t);
-    float y_1 = (h.y / sigma_b);
-    return (exp(((-0.5 * ((x_1 * x_1) + (y_1 * y_1))) / z_sqr)) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr));
+    float x = (h.x / sigma_t);
+    float y = (h.y / sigma_b);
+    return (exp(((-0.5 * ((x * x) + (y * y))) / z_sqr)) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr));
 }
 
 /// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
+///
+/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 float2 slope_from_normal(float3 n)
 {
     return (n.xy / (n.z).xx);
 }
 
 /// Unit normal of a slope.
+///
+/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 float3 normal_from_slope(float2 slope)
 {
     return (float3(slope, 1.0) * rsqrt((1.0 + dot(slope, slope))));
@@ -64,6 +74,8 @@ float3 normal_from_slope(float2 slope)
 /// Its first two columns are the tangent and bitangent of every aniso texel; a Gram–Schmidt tangent differs from them
 /// by 0.44° at a tilt of 10° and 18° at 60°, so decode with these. Orthonormal to 3e-7 for n.z ≥ 0; where `1 + n.z`
 /// is below 1e-6 the half turn about x is returned, whose third column is −z.
+///
+/// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 float3x3 m_n(float3 n)
 {
     float d = (1.0 + n.z);
@@ -77,6 +89,8 @@ float3x3 m_n(float3 n)
 
 /// A unit normal from the xy of a normal map, each in [−1, 1]. Where x² + y² exceeds one, as compression and
 /// filtering make it do, the normal lies on the horizon in the same direction.
+///
+/// Cost on GCN: 8 instructions (2 at a quarter of the rate).
 float3 normal_from_xy(float x, float y)
 {
     float xy_squared = ((x * x) + (y * y));
@@ -100,6 +114,8 @@ float3 normal_from_xy(float x, float y)
 /// Directional albedo of the single-scattering GGX lobe with height-correlated Smith masking and F = 1, for a view at
 /// cosine `n_v` (0 to 1): the share of a white furnace that comes back, 0.307 (= 1 − ln 2) to 1. A rational fit,
 /// within 0.011 of quadrature (0.004 RMS) for alpha and n_v in [0.005, 1]; it takes the place of a lookup table.
+///
+/// Cost on GCN: 27 instructions (1 at a quarter of the rate).
 float ggx_directional_albedo(float n_v, float alpha)
 {
     float m_sqr = (n_v * n_v);
@@ -112,6 +128,8 @@ float ggx_directional_albedo(float n_v, float alpha)
 /// Factor on the single-scattering lobe that restores the energy of all further bounces, `1 + f0 (1/E - 1)` (Turquin
 /// 2019, eq. 16), per pixel. The factor depends on the view alone, so the compensated lobe is not reciprocal. An
 /// anisotropic lobe uses the isotropic albedo at `alpha = sqrt((alpha_t² + alpha_b²)/2)`.
+///
+/// Cost on GCN: 38 instructions (3 at a quarter of the rate).
 float3 multiscatter_compensation(float3 f0_, float n_v, float alpha_t, float alpha_b)
 {
     float alpha = sqrt((0.5 * ((alpha_t * alpha_t) + (alpha_b * alpha_b))));
@@ -154,15 +172,19 @@ typedef float ret_sh_basis[9];
 #endif
 
 /// The basis functions at a unit direction.
+///
+/// Cost on GCN: 14 instructions.
 ret_sh_basis sh_basis(float3 direction)
 {
-    float x_2 = direction.x;
-    float y_2 = direction.y;
+    float x = direction.x;
+    float y = direction.y;
     float z = direction.z;
-    return Constructarray9_float_(0.2820948, (0.48860252 * y_2), (0.48860252 * z), (0.48860252 * x_2), ((1.0925484 * x_2) * y_2), ((1.0925484 * y_2) * z), (0.31539157 * (((3.0 * z) * z) - 1.0)), ((1.0925484 * x_2) * z), (0.5462742 * ((x_2 * x_2) - (y_2 * y_2))));
+    return Constructarray9_float_(0.2820948, (0.48860252 * y), (0.48860252 * z), (0.48860252 * x), ((1.0925484 * x) * y), ((1.0925484 * y) * z), (0.31539157 * (((3.0 * z) * z) - 1.0)), ((1.0925484 * x) * z), (0.5462742 * ((x * x) - (y * y))));
 }
 
 /// The function that the coefficients stand for, at a unit direction; negative where it rings.
+///
+/// Cost on GCN: 41 instructions.
 float3 sh_evaluate(float3 coefficients[9], float3 direction)
 {
     const float _e2[9] = sh_basis(direction);
@@ -189,6 +211,8 @@ typedef float3 ret_sh_convolve_cosine[9];
 
 /// Coefficients of irradiance from those of radiance (eq. 7), once per environment; `sh_evaluate` of the result is
 /// `sh_irradiance`, three multiplications a coefficient cheaper.
+///
+/// Cost on GCN: 27 instructions.
 ret_sh_convolve_cosine sh_convolve_cosine(float3 radiance[9])
 {
     return Constructarray9_float3_((radiance[0] * 3.1415927), (radiance[1] * 2.0943952), (radiance[2] * 2.0943952), (radiance[3] * 2.0943952), (radiance[4] * 0.7853982), (radiance[5] * 0.7853982), (radiance[6] * 0.7853982), (radiance[7] * 0.7853982), (radiance[8] * 0.7853982));
@@ -196,6 +220,8 @@ ret_sh_convolve_cosine sh_convolve_cosine(float3 radiance[9])
 
 /// Irradiance on a surface with unit `normal`, the integral of radiance times the clamped cosine. Light from one small
 /// spot can make it slightly negative on the far side; clamp where that matters.
+///
+/// Cost on GCN: 65 instructions.
 float3 sh_irradiance(float3 radiance[9], float3 normal)
 {
     const float3 _e2[9] = sh_convolve_cosine(radiance);
@@ -223,30 +249,40 @@ struct SymEigen {
 };
 
 /// The 2×2 matrix with eigenvalue `l1` along the unit vector `axis` and `l2` across it.
+///
+/// Cost on GCN: 11 instructions.
 float3 sym2_from_eigen(float l1_, float l2_, float2 axis)
 {
     return float3((((l1_ * axis.x) * axis.x) + ((l2_ * axis.y) * axis.y)), (((l1_ - l2_) * axis.x) * axis.y), (((l1_ * axis.y) * axis.y) + ((l2_ * axis.x) * axis.x)));
 }
 
 /// `v v^T`.
+///
+/// Cost on GCN: 3 instructions.
 float3 sym2_outer(float2 v)
 {
     return float3((v.x * v.x), (v.x * v.y), (v.y * v.y));
 }
 
 /// Determinant of a 2×2 matrix.
+///
+/// Cost on GCN: 2 instructions.
 float sym2_det(float3 a)
 {
     return ((a.x * a.z) - (a.y * a.y));
 }
 
 /// Trace of a 2×2 matrix.
+///
+/// Cost on GCN: 1 instruction.
 float sym2_trace(float3 a)
 {
     return (a.x + a.z);
 }
 
 /// `v^T A v`.
+///
+/// Cost on GCN: 7 instructions.
 float sym2_quadratic(float3 a, float2 v)
 {
     return ((((a.x * v.x) * v.x) + (((2.0 * a.y) * v.x) * v.y)) + ((a.z * v.y) * v.y));
@@ -266,6 +302,8 @@ SymEigen ConstructSymEigen(float arg0, float arg1, float2 arg2) {
 /// Eigenvalues and axis of a positive semi-definite matrix, both at least zero. The axis has x ≥ 0 (and y = +1
 /// where x = 0) and is (1, 0) when both eigenvalues are equal. The smaller is `det / larger`, which keeps its digits
 /// where the textbook's half difference cancels.
+///
+/// Cost on GCN: 33 instructions (5 at a quarter of the rate).
 SymEigen sym2_eigen(float3 a)
 {
     bool local = (bool)0;
@@ -295,6 +333,8 @@ SymEigen sym2_eigen(float3 a)
 
 /// The same eigenvectors with both eigenvalues clamped to `[lo, hi]`, `lo` ≥ 0. A matrix within the range comes back
 /// as it is.
+///
+/// Cost on GCN: 54 instructions (5 at a quarter of the rate).
 float3 sym2_clamp_eigen(float3 a, float lo, float hi)
 {
     bool local = (bool)0;
@@ -312,6 +352,8 @@ float3 sym2_clamp_eigen(float3 a, float lo, float hi)
 
 /// The positive semi-definite square root of a positive semi-definite matrix:
 /// `(A + sqrt(det) I) / sqrt(trace + 2 sqrt(det))`, by Cayley–Hamilton.
+///
+/// Cost on GCN: 17 instructions (3 at a quarter of the rate).
 float3 sym2_sqrt(float3 a)
 {
     const float _e1 = sym2_det(a);
@@ -325,24 +367,32 @@ float3 sym2_sqrt(float3 a)
 }
 
 /// `v^T A v`.
+///
+/// Cost on GCN: 12 instructions.
 float sym3_quadratic(float3x3 a, float3 v)
 {
     return dot(v, mul(v, a));
 }
 
 /// Trace of a 3×3 matrix.
+///
+/// Cost on GCN: 2 instructions.
 float sym3_trace(float3x3 a)
 {
     return ((a[0].x + a[1].y) + a[2].z);
 }
 
 /// The adjugate of a symmetric matrix: `A adj(A) = det(A) I`. Its columns are the cross products of A's.
+///
+/// Cost on GCN: 18 instructions.
 float3x3 sym3_adjugate(float3x3 a)
 {
     return float3x3(cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]));
 }
 
 /// Determinant of a symmetric 3×3 matrix.
+///
+/// Cost on GCN: 9 instructions.
 float sym3_det(float3x3 a)
 {
     return dot(a[0], cross(a[1], a[2]));
@@ -368,24 +418,24 @@ float sym3_det(float3x3 a)
 struct AnisoDecoded {
     float alpha_t;
     float alpha_b;
-    int _pad2_0;
-    int _pad2_1;
     float3 tangent;
-    int _pad3_0;
     float3 bitangent;
-    int _end_pad_0;
 };
 
 /// Smallest GGX roughness to shade with: one step of an 8-bit aniso channel.
 static const float ALPHA_MIN = 0.003921569;
 
 /// GGX alpha of a perceptual roughness in [0, 1]: its square, at least ALPHA_MIN.
+///
+/// Cost on GCN: 2 instructions.
 float alpha_from_roughness(float roughness)
 {
     return max((roughness * roughness), ALPHA_MIN);
 }
 
 /// GGX alpha of a gloss in [0, 1]: `(1 - gloss)²`, at least ALPHA_MIN.
+///
+/// Cost on GCN: 3 instructions.
 float alpha_from_gloss(float gloss)
 {
     const float _e3 = alpha_from_roughness((1.0 - gloss));
@@ -393,6 +443,8 @@ float alpha_from_gloss(float gloss)
 }
 
 /// Texel of a squared roughness matrix `s` (xx, xy, yy); each component in [0, 1]. rho is 0 where Sxx or Syy is 0.
+///
+/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 float3 aniso_encode(float3 s)
 {
     float product = (s.x * s.z);
@@ -404,6 +456,8 @@ float3 aniso_encode(float3 s)
 ///
 /// With `ggx_matrix_d` and `smith_matrix_v` this is all the decoding a light needs: cheaper than `aniso_decode` for a
 /// few lights. Add `sym2_clamp_eigen` where a determinant of zero would divide.
+///
+/// Cost on GCN: 5 instructions.
 float3 aniso_decode_matrix(float3 texel)
 {
     return float3((texel.x * texel.x), ((texel.x * ((texel.y * 2.0) - 1.0)) * texel.z), (texel.z * texel.z));
@@ -428,6 +482,8 @@ AnisoDecoded ConstructAnisoDecoded(float arg0, float arg1, float3 arg2, float3 a
 /// slide's half difference cancels. And Sxy = 0 counts as positive: with HLSL's `sign`, which is zero there, the
 /// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
 /// 0.03° of the exact one.
+///
+/// Cost on GCN: 36 instructions (5 at a quarter of the rate).
 AnisoDecoded aniso_decode(float3 texel, float3 tangent, float3 bitangent)
 {
     float rho = ((texel.y * 2.0) - 1.0);
@@ -435,14 +491,14 @@ AnisoDecoded aniso_decode(float3 texel, float3 tangent, float3 bitangent)
     float sxy = (product * rho);
     float sxx = ((texel.x * texel.x) + 1e-12);
     float syy = (texel.z * texel.z);
-    float difference = (sxx - syy);
-    float discr_sqr = ((difference * difference) + ((4.0 * sxy) * sxy));
+    float half_difference = (0.5 * (sxx - syy));
+    float discr_sqr = (4.0 * ((half_difference * half_difference) + (sxy * sxy)));
     float discr_rcp = rsqrt(discr_sqr);
     float alpha_t_sqr = (0.5 * ((sxx + syy) + (discr_sqr * discr_rcp)));
     float alpha_t_rcp = rsqrt(alpha_t_sqr);
     float alpha_t = (alpha_t_sqr * alpha_t_rcp);
     float alpha_b = ((product * sqrt((1.0 - (rho * rho)))) * alpha_t_rcp);
-    float c_sqr = saturate((((0.5 * difference) * discr_rcp) + 0.5));
+    float c_sqr = saturate(((half_difference * discr_rcp) + 0.5));
     float c = sqrt(c_sqr);
     float s_abs = sqrt((1.0 - c_sqr));
     float s = ((sxy < 0.0) ? -(s_abs) : s_abs);
@@ -452,6 +508,8 @@ AnisoDecoded aniso_decode(float3 texel, float3 tangent, float3 bitangent)
 
 /// Squared roughness matrix (xx, xy, yy) with `alpha_t` along the unit vector `axis` of the `m_n` frame, `alpha_b`
 /// across.
+///
+/// Cost on GCN: 13 instructions.
 float3 aniso_from_alphas(float alpha_t, float alpha_b, float2 axis)
 {
     const float3 _e5 = sym2_from_eigen((alpha_t * alpha_t), (alpha_b * alpha_b), axis);
@@ -460,6 +518,8 @@ float3 aniso_from_alphas(float alpha_t, float alpha_b, float2 axis)
 
 /// Direction in the `m_n` frame of a direction painted in the mesh's tangent plane: what Gram–Schmidt, `d - (d·n) n`,
 /// makes of it. Both are unit vectors; where nothing is left of it, the direction stays as it is.
+///
+/// Cost on GCN: 23 instructions (2 at a quarter of the rate).
 float2 axis_from_direction(float2 direction, float3 n)
 {
     const float3x3 _e2 = m_n(n);
@@ -470,6 +530,8 @@ float2 axis_from_direction(float2 direction, float3 n)
 
 /// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
 /// turns into `axis` of the `m_n` frame.
+///
+/// Cost on GCN: 31 instructions (2 at a quarter of the rate).
 float2 direction_from_axis(float2 axis, float3 n)
 {
     const float3x3 _e2 = m_n(n);
@@ -481,6 +543,8 @@ float2 direction_from_axis(float2 axis, float3 n)
 
 /// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
 /// `alpha_t = mix(alpha_b, 1, strength²)`.
+///
+/// Cost on GCN: 5 instructions.
 float2 alphas_from_khr_anisotropy(float roughness, float strength)
 {
     const float _e2 = alpha_from_roughness(roughness);
@@ -489,6 +553,8 @@ float2 alphas_from_khr_anisotropy(float roughness, float strength)
 
 /// Perceptual roughness and anisotropy strength of `KHR_materials_anisotropy` for `alpha_t ≥ alpha_b`; the inverse of
 /// `alphas_from_khr_anisotropy`.
+///
+/// Cost on GCN: 8 instructions (3 at a quarter of the rate).
 float2 khr_anisotropy_from_alphas(float alpha_t, float alpha_b)
 {
     float rest = (1.0 - alpha_b);
@@ -523,6 +589,8 @@ static const float FRAC_1_PI = 0.31830987;
 
 /// Isotropic distribution of microfacet normals per steradian, `n_h = n·h` (Walter 2007, eq. 33). One ulp of `n_h`
 /// moves the peak by `2.4e-7 / alpha²`; where that matters, `ggx_aniso_d` has all the digits.
+///
+/// Cost on GCN: 10 instructions (1 at a quarter of the rate).
 float ggx_d(float n_h, float alpha)
 {
     float a_sqr = (alpha * alpha);
@@ -532,6 +600,8 @@ float ggx_d(float n_h, float alpha)
 
 /// Anisotropic distribution of microfacet normals per steradian (slide: Our Algorithm, the form with
 /// `(alpha_t alpha_b)^3`), for `h` in the upper hemisphere. Its integral against n·h over there is one.
+///
+/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
 float ggx_aniso_d(float3 h, float alpha_t, float alpha_b)
 {
     float alpha_tb = (alpha_t * alpha_b);
@@ -542,6 +612,8 @@ float ggx_aniso_d(float3 h, float alpha_t, float alpha_b)
 
 /// `ggx_aniso_d` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode:
 /// `|A|^(3/2) / (π (h.xy^T adj(A) h.xy + |A| h.z²)²)`. `|A|` must be positive.
+///
+/// Cost on GCN: 17 instructions (2 at a quarter of the rate).
 float ggx_matrix_d(float3 h, float3 a)
 {
     const float _e2 = sym2_det(a);
@@ -552,12 +624,16 @@ float ggx_matrix_d(float3 h, float3 a)
 
 /// Visibility from the two terms of `2 n·u n·v (1 + Λ(u) + Λ(v))`: `n·v |u'|` and `n·u |v'|`, where the prime
 /// stretches a direction by the roughness. Finite, and meaningless, where both directions graze.
+///
+/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 float smith_v_of_terms(float u, float v)
 {
     return (0.5 / max((u + v), MIN_POSITIVE));
 }
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, isotropic (Heitz 2014, eq. 99).
+///
+/// Cost on GCN: 12 instructions (3 at a quarter of the rate).
 float smith_v(float n_u, float n_v, float alpha)
 {
     float a_sqr = (alpha * alpha);
@@ -569,6 +645,8 @@ float smith_v(float n_u, float n_v, float alpha)
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, anisotropic (Heitz 2014, eq. 99 with the lambda of section
 /// 5.3). `u` and `v` lie in the upper hemisphere.
+///
+/// Cost on GCN: 16 instructions (3 at a quarter of the rate).
 float smith_aniso_v(float3 u, float3 v, float alpha_t, float alpha_b)
 {
     float3 stretch = float3(alpha_t, alpha_b, 1.0);
@@ -577,6 +655,8 @@ float smith_aniso_v(float3 u, float3 v, float alpha_t, float alpha_b)
 }
 
 /// `smith_aniso_v` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode.
+///
+/// Cost on GCN: 21 instructions (3 at a quarter of the rate).
 float smith_matrix_v(float3 u, float3 v, float3 a)
 {
     const float _e4 = sym2_quadratic(a, u.xy);
@@ -588,12 +668,16 @@ float smith_matrix_v(float3 u, float3 v, float3 a)
 }
 
 /// Smith masking of `v` alone, 0 to 1 (Heitz 2014, eq. 43).
+///
+/// Cost on GCN: 10 instructions (2 at a quarter of the rate).
 float smith_aniso_g1(float3 v, float alpha_t, float alpha_b)
 {
     return ((2.0 * v.z) / (v.z + length((v * float3(alpha_t, alpha_b, 1.0)))));
 }
 
 /// Fresnel reflectance by Schlick's approximation (1994) from `f0` at normal incidence to one at grazing.
+///
+/// Cost on GCN: 10 instructions.
 float3 schlick_f(float3 f0_1, float v_h)
 {
     float m = saturate((1.0 - v_h));
@@ -603,14 +687,16 @@ float3 schlick_f(float3 f0_1, float v_h)
 
 /// A microfacet normal distributed as `ggx_vndf_pdf` for the view direction `v`, from two uniform numbers in [0, 1)
 /// (Dupuy, Benyoub 2023, listing 3).
+///
+/// Cost on GCN: 32 instructions (5 at a quarter of the rate).
 float3 ggx_vndf_sample(float3 v, float alpha_t, float alpha_b, float2 xi)
 {
     float3 stretch = float3(alpha_t, alpha_b, 1.0);
     float3 v_std = normalize((v * stretch));
     float phi = (6.2831855 * xi.x);
-    float z_1 = (((1.0 - xi.y) * (1.0 + v_std.z)) - v_std.z);
-    float sin_theta = sqrt(max((1.0 - (z_1 * z_1)), 0.0));
-    float3 cap = float3((sin_theta * cos(phi)), (sin_theta * sin(phi)), z_1);
+    float z = (((1.0 - xi.y) * (1.0 + v_std.z)) - v_std.z);
+    float sin_theta = sqrt(max((1.0 - (z * z)), 0.0));
+    float3 cap = float3((sin_theta * cos(phi)), (sin_theta * sin(phi)), z);
     float3 h = ((cap + v_std) * stretch);
     float length_squared = dot(h, h);
     return ((length_squared > 0.0) ? (h * rsqrt(length_squared)) : float3(0.0, 0.0, 1.0));
@@ -618,6 +704,8 @@ float3 ggx_vndf_sample(float3 v, float alpha_t, float alpha_b, float2 xi)
 
 /// Density per steradian of microfacet normals visible from `v`: `G1(v) max(v·h, 0) D(h) / n·v` (Heitz 2014, eq. 16).
 /// Divide by `4 v·h` for the density of the reflected direction.
+///
+/// Cost on GCN: 29 instructions (3 at a quarter of the rate).
 float ggx_vndf_pdf(float3 v, float3 h, float alpha_t, float alpha_b)
 {
     if ((h.z <= 0.0)) {
@@ -646,22 +734,19 @@ float ggx_vndf_pdf(float3 v, float3 h, float alpha_t, float alpha_b)
 /// A surface: unit normal, and squared roughness matrix (xx, xy, yy) in the frame of `m_n`.
 struct GgxSurface {
     float3 normal;
-    int _pad1_0;
     float3 a;
-    int _end_pad_0;
 };
 
 /// A distribution of slopes: centre and squared roughness (xx, xy, yy), both dimensionless.
 struct SlopeDistribution {
     float2 m;
-    int _pad1_0;
-    int _pad1_1;
     float3 a;
-    int _end_pad_0;
 };
 
 /// `S = M_n [A 0; 0 1] M_n^T` (slide: Our Algorithm, step 1): the SGGX matrix of a GGX surface with unit normal `n`
 /// and squared roughness matrix `a` (xx, xy, yy) in the frame of `m_n`.
+///
+/// Cost on GCN: 51 instructions (1 at a quarter of the rate).
 float3x3 sggx_from_ggx(float3 n, float3 a)
 {
     const float3x3 _e2 = m_n(n);
@@ -671,6 +756,8 @@ float3x3 sggx_from_ggx(float3 n, float3 a)
 }
 
 /// Area of the microflakes projected along the unit vector `w`: `sqrt(w^T S w)` (Heitz 2015).
+///
+/// Cost on GCN: 14 instructions (1 at a quarter of the rate).
 float sggx_projected_area(float3x3 s, float3 w)
 {
     const float _e2 = sym3_quadratic(s, w);
@@ -680,6 +767,8 @@ float sggx_projected_area(float3x3 s, float3 w)
 /// Distribution of microflake normals at the unit vector `h`, a density per steradian over the sphere:
 /// `1 / (π sqrt|S| (h^T S^-1 h)^2)` (Heitz 2015), written as `|S|^(3/2) / (π (h^T adj(S) h)^2)`. `s` must have a
 /// positive determinant. Single precision leaves a relative error of 1e-5 over the smallest eigenvalue.
+///
+/// Cost on GCN: 39 instructions (2 at a quarter of the rate).
 float sggx_d(float3x3 s, float3 h)
 {
     const float _e2 = sym3_det(s);
@@ -700,6 +789,8 @@ SlopeDistribution ConstructSlopeDistribution(float2 arg0, float3 arg1) {
 
 /// The slope distribution an SGGX matrix with zz > 0 stands for, seen from the z axis: `S / S_zz = [A + m m^T, m;
 /// m^T, 1]`. The slopes follow a bivariate Student-t with two degrees of freedom.
+///
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 SlopeDistribution slopes_from_sggx(float3x3 s)
 {
     float inv = (1.0 / s[2].z);
@@ -710,6 +801,8 @@ SlopeDistribution slopes_from_sggx(float3x3 s)
 }
 
 /// The SGGX matrix with zz = 1 of a slope distribution; the inverse of `slopes_from_sggx`.
+///
+/// Cost on GCN: 3 instructions.
 float3x3 sggx_from_slopes(float2 m, float3 a)
 {
     float xy = (a.y + (m.x * m.y));
@@ -719,6 +812,8 @@ float3x3 sggx_from_slopes(float2 m, float3 a)
 /// The talk's power iteration (slide: Our Algorithm, step 3): `steps` times `n = S n / |S n|` from `start`. The
 /// tangent of the error shrinks by the ratio of the two largest eigenvalues a step; in V grooves steeper than 45° it
 /// leaves the surface for its walls. `sggx_principal_axis` has neither fault.
+///
+/// Cost on GCN: 34 instructions (2 at a quarter of the rate), one round of its loop.
 float3 sggx_power_iteration(float3x3 s, float3 start, uint steps)
 {
     float3 n = (float3)0;
@@ -752,6 +847,8 @@ float3 sggx_power_iteration(float3x3 s, float3 start, uint steps)
 }
 
 /// Squared overlap with the eigenvector of `l`, from the moments m' B m and |B m|² of a deviator of unit size.
+///
+/// Cost on GCN: 7 instructions (1 at a quarter of the rate).
 float sggx_overlap(float l, float moment, float moment_sqr)
 {
     return ((((moment_sqr + (l * moment)) + (l * l)) - 3.0) / (((3.0 * l) * l) - 3.0));
@@ -761,6 +858,8 @@ float sggx_overlap(float l, float moment, float moment_sqr)
 /// Started at the mean normal of a footprint it finds the filtered normal, also where the largest eigenvalue is
 /// another one (V grooves steeper than 45°). Where eigenvalues coincide, to 0.1 % of their spread, it is the
 /// projection of `start` on their space; `start` itself if `s` is a multiple of the identity. No trigonometry.
+///
+/// Cost on GCN: 204 instructions (10 at a quarter of the rate).
 float3 sggx_principal_axis(float3x3 s, float3 start)
 {
     bool local_2 = (bool)0;
@@ -830,6 +929,8 @@ GgxSurface ConstructGgxSurface(float3 arg0, float3 arg1) {
 #endif
 
 /// `ggx_from_sggx` before the clamp of the roughness.
+///
+/// Cost on GCN: 268 instructions (12 at a quarter of the rate).
 GgxSurface ggx_from_sggx_unclamped(float3x3 s, float3 mean_normal)
 {
     const float3 _e2 = sggx_principal_axis(s, mean_normal);
@@ -846,6 +947,8 @@ GgxSurface ggx_from_sggx_unclamped(float3x3 s, float3 mean_normal)
 /// Normal and squared roughness matrix of a filtered SGGX matrix (slide: Our Algorithm, step 3). `mean_normal`, a unit
 /// vector, picks the eigenvector as in `sggx_principal_axis`. The normal returned has z ≥ 0, eigenvalues of the
 /// roughness lie in [0, 1]: a microsurface rougher than alpha = 1 is clamped, because no texture can hold it.
+///
+/// Cost on GCN: 321 instructions (17 at a quarter of the rate).
 GgxSurface ggx_from_sggx(float3x3 s, float3 mean_normal)
 {
     const GgxSurface _e2 = ggx_from_sggx_unclamped(s, mean_normal);

@@ -16,22 +16,19 @@
 /// A surface: unit normal, and squared roughness matrix (xx, xy, yy) in the frame of `m_n`.
 struct GgxSurface {
     float3 normal;
-    int _pad1_0;
     float3 a;
-    int _end_pad_0;
 };
 
 /// A distribution of slopes: centre and squared roughness (xx, xy, yy), both dimensionless.
 struct SlopeDistribution {
     float2 m;
-    int _pad1_0;
-    int _pad1_1;
     float3 a;
-    int _end_pad_0;
 };
 
 /// `S = M_n [A 0; 0 1] M_n^T` (slide: Our Algorithm, step 1): the SGGX matrix of a GGX surface with unit normal `n`
 /// and squared roughness matrix `a` (xx, xy, yy) in the frame of `m_n`.
+///
+/// Cost on GCN: 51 instructions (1 at a quarter of the rate).
 float3x3 sggx_from_ggx(float3 n, float3 a)
 {
     const float3x3 _e2 = m_n(n);
@@ -41,6 +38,8 @@ float3x3 sggx_from_ggx(float3 n, float3 a)
 }
 
 /// Area of the microflakes projected along the unit vector `w`: `sqrt(w^T S w)` (Heitz 2015).
+///
+/// Cost on GCN: 14 instructions (1 at a quarter of the rate).
 float sggx_projected_area(float3x3 s, float3 w)
 {
     const float _e2 = sym3_quadratic(s, w);
@@ -50,6 +49,8 @@ float sggx_projected_area(float3x3 s, float3 w)
 /// Distribution of microflake normals at the unit vector `h`, a density per steradian over the sphere:
 /// `1 / (π sqrt|S| (h^T S^-1 h)^2)` (Heitz 2015), written as `|S|^(3/2) / (π (h^T adj(S) h)^2)`. `s` must have a
 /// positive determinant. Single precision leaves a relative error of 1e-5 over the smallest eigenvalue.
+///
+/// Cost on GCN: 39 instructions (2 at a quarter of the rate).
 float sggx_d(float3x3 s, float3 h)
 {
     const float _e2 = sym3_det(s);
@@ -70,6 +71,8 @@ SlopeDistribution ConstructSlopeDistribution(float2 arg0, float3 arg1) {
 
 /// The slope distribution an SGGX matrix with zz > 0 stands for, seen from the z axis: `S / S_zz = [A + m m^T, m;
 /// m^T, 1]`. The slopes follow a bivariate Student-t with two degrees of freedom.
+///
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 SlopeDistribution slopes_from_sggx(float3x3 s)
 {
     float inv = (1.0 / s[2].z);
@@ -80,6 +83,8 @@ SlopeDistribution slopes_from_sggx(float3x3 s)
 }
 
 /// The SGGX matrix with zz = 1 of a slope distribution; the inverse of `slopes_from_sggx`.
+///
+/// Cost on GCN: 3 instructions.
 float3x3 sggx_from_slopes(float2 m, float3 a)
 {
     float xy = (a.y + (m.x * m.y));
@@ -89,6 +94,8 @@ float3x3 sggx_from_slopes(float2 m, float3 a)
 /// The talk's power iteration (slide: Our Algorithm, step 3): `steps` times `n = S n / |S n|` from `start`. The
 /// tangent of the error shrinks by the ratio of the two largest eigenvalues a step; in V grooves steeper than 45° it
 /// leaves the surface for its walls. `sggx_principal_axis` has neither fault.
+///
+/// Cost on GCN: 34 instructions (2 at a quarter of the rate), one round of its loop.
 float3 sggx_power_iteration(float3x3 s, float3 start, uint steps)
 {
     float3 n = (float3)0;
@@ -122,6 +129,8 @@ float3 sggx_power_iteration(float3x3 s, float3 start, uint steps)
 }
 
 /// Squared overlap with the eigenvector of `l`, from the moments m' B m and |B m|² of a deviator of unit size.
+///
+/// Cost on GCN: 7 instructions (1 at a quarter of the rate).
 float sggx_overlap(float l, float moment, float moment_sqr)
 {
     return ((((moment_sqr + (l * moment)) + (l * l)) - 3.0) / (((3.0 * l) * l) - 3.0));
@@ -131,6 +140,8 @@ float sggx_overlap(float l, float moment, float moment_sqr)
 /// Started at the mean normal of a footprint it finds the filtered normal, also where the largest eigenvalue is
 /// another one (V grooves steeper than 45°). Where eigenvalues coincide, to 0.1 % of their spread, it is the
 /// projection of `start` on their space; `start` itself if `s` is a multiple of the identity. No trigonometry.
+///
+/// Cost on GCN: 204 instructions (10 at a quarter of the rate).
 float3 sggx_principal_axis(float3x3 s, float3 start)
 {
     bool local_2 = (bool)0;
@@ -200,6 +211,8 @@ GgxSurface ConstructGgxSurface(float3 arg0, float3 arg1) {
 #endif
 
 /// `ggx_from_sggx` before the clamp of the roughness.
+///
+/// Cost on GCN: 268 instructions (12 at a quarter of the rate).
 GgxSurface ggx_from_sggx_unclamped(float3x3 s, float3 mean_normal)
 {
     const float3 _e2 = sggx_principal_axis(s, mean_normal);
@@ -216,6 +229,8 @@ GgxSurface ggx_from_sggx_unclamped(float3x3 s, float3 mean_normal)
 /// Normal and squared roughness matrix of a filtered SGGX matrix (slide: Our Algorithm, step 3). `mean_normal`, a unit
 /// vector, picks the eigenvector as in `sggx_principal_axis`. The normal returned has z ≥ 0, eigenvalues of the
 /// roughness lie in [0, 1]: a microsurface rougher than alpha = 1 is clamped, because no texture can hold it.
+///
+/// Cost on GCN: 321 instructions (17 at a quarter of the rate).
 GgxSurface ggx_from_sggx(float3x3 s, float3 mean_normal)
 {
     const GgxSurface _e2 = ggx_from_sggx_unclamped(s, mean_normal);

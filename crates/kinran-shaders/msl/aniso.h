@@ -29,6 +29,8 @@ struct AnisoDecoded {
 constant float ALPHA_MIN = 0.003921569;
 
 /// GGX alpha of a perceptual roughness in [0, 1]: its square, at least ALPHA_MIN.
+///
+/// Cost on GCN: 2 instructions.
 inline float alpha_from_roughness(
     float roughness
 ) {
@@ -36,6 +38,8 @@ inline float alpha_from_roughness(
 }
 
 /// GGX alpha of a gloss in [0, 1]: `(1 - gloss)²`, at least ALPHA_MIN.
+///
+/// Cost on GCN: 3 instructions.
 inline float alpha_from_gloss(
     float gloss
 ) {
@@ -44,6 +48,8 @@ inline float alpha_from_gloss(
 }
 
 /// Texel of a squared roughness matrix `s` (xx, xy, yy); each component in [0, 1]. rho is 0 where Sxx or Syy is 0.
+///
+/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 inline metal::float3 aniso_encode(
     metal::float3 s
 ) {
@@ -56,6 +62,8 @@ inline metal::float3 aniso_encode(
 ///
 /// With `ggx_matrix_d` and `smith_matrix_v` this is all the decoding a light needs: cheaper than `aniso_decode` for a
 /// few lights. Add `sym2_clamp_eigen` where a determinant of zero would divide.
+///
+/// Cost on GCN: 5 instructions.
 inline metal::float3 aniso_decode_matrix(
     metal::float3 texel
 ) {
@@ -69,6 +77,8 @@ inline metal::float3 aniso_decode_matrix(
 /// slide's half difference cancels. And Sxy = 0 counts as positive: with HLSL's `sign`, which is zero there, the
 /// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
 /// 0.03° of the exact one.
+///
+/// Cost on GCN: 36 instructions (5 at a quarter of the rate).
 inline AnisoDecoded aniso_decode(
     metal::float3 texel,
     metal::float3 tangent,
@@ -79,14 +89,14 @@ inline AnisoDecoded aniso_decode(
     float sxy = product * rho;
     float sxx = (texel.x * texel.x) + 0.000000000001;
     float syy = texel.z * texel.z;
-    float difference = sxx - syy;
-    float discr_sqr = (difference * difference) + ((4.0 * sxy) * sxy);
+    float half_difference = 0.5 * (sxx - syy);
+    float discr_sqr = 4.0 * ((half_difference * half_difference) + (sxy * sxy));
     float discr_rcp = metal::rsqrt(discr_sqr);
     float alpha_t_sqr = 0.5 * ((sxx + syy) + (discr_sqr * discr_rcp));
     float alpha_t_rcp = metal::rsqrt(alpha_t_sqr);
     float alpha_t = alpha_t_sqr * alpha_t_rcp;
     float alpha_b = (product * metal::sqrt(1.0 - (rho * rho))) * alpha_t_rcp;
-    float c_sqr = metal::saturate(((0.5 * difference) * discr_rcp) + 0.5);
+    float c_sqr = metal::saturate((half_difference * discr_rcp) + 0.5);
     float c = metal::sqrt(c_sqr);
     float s_abs = metal::sqrt(1.0 - c_sqr);
     float s = (sxy < 0.0) ? -(s_abs) : s_abs;
@@ -95,6 +105,8 @@ inline AnisoDecoded aniso_decode(
 
 /// Squared roughness matrix (xx, xy, yy) with `alpha_t` along the unit vector `axis` of the `m_n` frame, `alpha_b`
 /// across.
+///
+/// Cost on GCN: 13 instructions.
 inline metal::float3 aniso_from_alphas(
     float alpha_t,
     float alpha_b,
@@ -106,6 +118,8 @@ inline metal::float3 aniso_from_alphas(
 
 /// Direction in the `m_n` frame of a direction painted in the mesh's tangent plane: what Gram–Schmidt, `d - (d·n) n`,
 /// makes of it. Both are unit vectors; where nothing is left of it, the direction stays as it is.
+///
+/// Cost on GCN: 23 instructions (2 at a quarter of the rate).
 inline metal::float2 axis_from_direction(
     metal::float2 direction,
     metal::float3 n
@@ -118,6 +132,8 @@ inline metal::float2 axis_from_direction(
 
 /// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
 /// turns into `axis` of the `m_n` frame.
+///
+/// Cost on GCN: 31 instructions (2 at a quarter of the rate).
 inline metal::float2 direction_from_axis(
     metal::float2 axis,
     metal::float3 n
@@ -131,6 +147,8 @@ inline metal::float2 direction_from_axis(
 
 /// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
 /// `alpha_t = mix(alpha_b, 1, strength²)`.
+///
+/// Cost on GCN: 5 instructions.
 inline metal::float2 alphas_from_khr_anisotropy(
     float roughness,
     float strength
@@ -141,6 +159,8 @@ inline metal::float2 alphas_from_khr_anisotropy(
 
 /// Perceptual roughness and anisotropy strength of `KHR_materials_anisotropy` for `alpha_t ≥ alpha_b`; the inverse of
 /// `alphas_from_khr_anisotropy`.
+///
+/// Cost on GCN: 8 instructions (3 at a quarter of the rate).
 inline metal::float2 khr_anisotropy_from_alphas(
     float alpha_t,
     float alpha_b

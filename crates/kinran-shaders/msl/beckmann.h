@@ -14,6 +14,8 @@
 
 /// Beckmann's sigma, the standard deviation of slopes, that stands for a GGX alpha (slide: LEAN Mapping):
 /// `alpha / sqrt(2)`.
+///
+/// Cost on GCN: 1 instruction.
 inline float sigma_from_alpha(
     float alpha
 ) {
@@ -21,6 +23,8 @@ inline float sigma_from_alpha(
 }
 
 /// The inverse of `sigma_from_alpha`.
+///
+/// Cost on GCN: 1 instruction.
 inline float alpha_from_sigma(
     float sigma
 ) {
@@ -29,6 +33,8 @@ inline float alpha_from_sigma(
 
 /// Distribution of microfacet normals per steradian with slope deviations `sigma_t`, `sigma_b` along x and y
 /// (Beckmann 1963): `exp(-(x²/σt² + y²/σb²) / (2 z²)) / (2π σt σb z⁴)`, zero below the horizon.
+///
+/// Cost on GCN: 20 instructions (5 at a quarter of the rate).
 inline float beckmann_aniso_d(
     metal::float3 h,
     float sigma_t,
@@ -38,12 +44,14 @@ inline float beckmann_aniso_d(
         return 0.0;
     }
     float z_sqr = h.z * h.z;
-    float x_1 = h.x / sigma_t;
-    float y_1 = h.y / sigma_b;
-    return metal::exp((-0.5 * ((x_1 * x_1) + (y_1 * y_1))) / z_sqr) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr);
+    float x = h.x / sigma_t;
+    float y = h.y / sigma_b;
+    return metal::exp((-0.5 * ((x * x) + (y * y))) / z_sqr) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr);
 }
 
 /// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
+///
+/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 inline metal::float2 slope_from_normal(
     metal::float3 n
 ) {
@@ -51,6 +59,8 @@ inline metal::float2 slope_from_normal(
 }
 
 /// Unit normal of a slope.
+///
+/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 inline metal::float3 normal_from_slope(
     metal::float2 slope
 ) {

@@ -14,6 +14,8 @@
 /// Its first two columns are the tangent and bitangent of every aniso texel; a Gram–Schmidt tangent differs from them
 /// by 0.44° at a tilt of 10° and 18° at 60°, so decode with these. Orthonormal to 3e-7 for n.z ≥ 0; where `1 + n.z`
 /// is below 1e-6 the half turn about x is returned, whose third column is −z.
+///
+/// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 inline metal::float3x3 m_n(
     metal::float3 n
 ) {
@@ -28,6 +30,8 @@ inline metal::float3x3 m_n(
 
 /// A unit normal from the xy of a normal map, each in [−1, 1]. Where x² + y² exceeds one, as compression and
 /// filtering make it do, the normal lies on the horizon in the same direction.
+///
+/// Cost on GCN: 8 instructions (2 at a quarter of the rate).
 inline metal::float3 normal_from_xy(
     float x,
     float y

@@ -26,6 +26,8 @@ constant float FRAC_1_PI = 0.31830987;
 
 /// Isotropic distribution of microfacet normals per steradian, `n_h = n·h` (Walter 2007, eq. 33). One ulp of `n_h`
 /// moves the peak by `2.4e-7 / alpha²`; where that matters, `ggx_aniso_d` has all the digits.
+///
+/// Cost on GCN: 10 instructions (1 at a quarter of the rate).
 inline float ggx_d(
     float n_h,
     float alpha
@@ -37,6 +39,8 @@ inline float ggx_d(
 
 /// Anisotropic distribution of microfacet normals per steradian (slide: Our Algorithm, the form with
 /// `(alpha_t alpha_b)^3`), for `h` in the upper hemisphere. Its integral against n·h over there is one.
+///
+/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
 inline float ggx_aniso_d(
     metal::float3 h,
     float alpha_t,
@@ -50,6 +54,8 @@ inline float ggx_aniso_d(
 
 /// `ggx_aniso_d` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode:
 /// `|A|^(3/2) / (π (h.xy^T adj(A) h.xy + |A| h.z²)²)`. `|A|` must be positive.
+///
+/// Cost on GCN: 17 instructions (2 at a quarter of the rate).
 inline float ggx_matrix_d(
     metal::float3 h,
     metal::float3 a
@@ -62,6 +68,8 @@ inline float ggx_matrix_d(
 
 /// Visibility from the two terms of `2 n·u n·v (1 + Λ(u) + Λ(v))`: `n·v |u'|` and `n·u |v'|`, where the prime
 /// stretches a direction by the roughness. Finite, and meaningless, where both directions graze.
+///
+/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 inline float smith_v_of_terms(
     float u,
     float v
@@ -70,6 +78,8 @@ inline float smith_v_of_terms(
 }
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, isotropic (Heitz 2014, eq. 99).
+///
+/// Cost on GCN: 12 instructions (3 at a quarter of the rate).
 inline float smith_v(
     float n_u,
     float n_v,
@@ -84,6 +94,8 @@ inline float smith_v(
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, anisotropic (Heitz 2014, eq. 99 with the lambda of section
 /// 5.3). `u` and `v` lie in the upper hemisphere.
+///
+/// Cost on GCN: 16 instructions (3 at a quarter of the rate).
 inline float smith_aniso_v(
     metal::float3 u,
     metal::float3 v,
@@ -96,6 +108,8 @@ inline float smith_aniso_v(
 }
 
 /// `smith_aniso_v` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode.
+///
+/// Cost on GCN: 21 instructions (3 at a quarter of the rate).
 inline float smith_matrix_v(
     metal::float3 u,
     metal::float3 v,
@@ -110,6 +124,8 @@ inline float smith_matrix_v(
 }
 
 /// Smith masking of `v` alone, 0 to 1 (Heitz 2014, eq. 43).
+///
+/// Cost on GCN: 10 instructions (2 at a quarter of the rate).
 inline float smith_aniso_g1(
     metal::float3 v,
     float alpha_t,
@@ -119,6 +135,8 @@ inline float smith_aniso_g1(
 }
 
 /// Fresnel reflectance by Schlick's approximation (1994) from `f0` at normal incidence to one at grazing.
+///
+/// Cost on GCN: 10 instructions.
 inline metal::float3 schlick_f(
     metal::float3 f0_1,
     float v_h
@@ -130,6 +148,8 @@ inline metal::float3 schlick_f(
 
 /// A microfacet normal distributed as `ggx_vndf_pdf` for the view direction `v`, from two uniform numbers in [0, 1)
 /// (Dupuy, Benyoub 2023, listing 3).
+///
+/// Cost on GCN: 32 instructions (5 at a quarter of the rate).
 inline metal::float3 ggx_vndf_sample(
     metal::float3 v,
     float alpha_t,
@@ -139,9 +159,9 @@ inline metal::float3 ggx_vndf_sample(
     metal::float3 stretch = metal::float3(alpha_t, alpha_b, 1.0);
     metal::float3 v_std = metal::normalize(v * stretch);
     float phi = 6.2831855 * xi.x;
-    float z_1 = ((1.0 - xi.y) * (1.0 + v_std.z)) - v_std.z;
-    float sin_theta = metal::sqrt(metal::max(1.0 - (z_1 * z_1), 0.0));
-    metal::float3 cap = metal::float3(sin_theta * metal::cos(phi), sin_theta * metal::sin(phi), z_1);
+    float z = ((1.0 - xi.y) * (1.0 + v_std.z)) - v_std.z;
+    float sin_theta = metal::sqrt(metal::max(1.0 - (z * z), 0.0));
+    metal::float3 cap = metal::float3(sin_theta * metal::cos(phi), sin_theta * metal::sin(phi), z);
     metal::float3 h = (cap + v_std) * stretch;
     float length_squared = metal::dot(h, h);
     return (length_squared > 0.0) ? (h * metal::rsqrt(length_squared)) : metal::float3(0.0, 0.0, 1.0);
@@ -149,6 +169,8 @@ inline metal::float3 ggx_vndf_sample(
 
 /// Density per steradian of microfacet normals visible from `v`: `G1(v) max(v·h, 0) D(h) / n·v` (Heitz 2014, eq. 16).
 /// Divide by `4 v·h` for the density of the reflected direction.
+///
+/// Cost on GCN: 29 instructions (3 at a quarter of the rate).
 inline float ggx_vndf_pdf(
     metal::float3 v,
     metal::float3 h,

@@ -14,6 +14,8 @@
 /// Directional albedo of the single-scattering GGX lobe with height-correlated Smith masking and F = 1, for a view at
 /// cosine `n_v` (0 to 1): the share of a white furnace that comes back, 0.307 (= 1 − ln 2) to 1. A rational fit,
 /// within 0.011 of quadrature (0.004 RMS) for alpha and n_v in [0.005, 1]; it takes the place of a lookup table.
+///
+/// Cost on GCN: 27 instructions (1 at a quarter of the rate).
 inline float ggx_directional_albedo(
     float n_v,
     float alpha
@@ -28,6 +30,8 @@ inline float ggx_directional_albedo(
 /// Factor on the single-scattering lobe that restores the energy of all further bounces, `1 + f0 (1/E - 1)` (Turquin
 /// 2019, eq. 16), per pixel. The factor depends on the view alone, so the compensated lobe is not reciprocal. An
 /// anisotropic lobe uses the isotropic albedo at `alpha = sqrt((alpha_t² + alpha_b²)/2)`.
+///
+/// Cost on GCN: 38 instructions (3 at a quarter of the rate).
 inline metal::float3 multiscatter_compensation(
     metal::float3 f0_,
     float n_v,

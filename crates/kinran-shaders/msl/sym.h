@@ -18,6 +18,8 @@ struct SymEigen {
 };
 
 /// The 2×2 matrix with eigenvalue `l1` along the unit vector `axis` and `l2` across it.
+///
+/// Cost on GCN: 11 instructions.
 inline metal::float3 sym2_from_eigen(
     float l1_,
     float l2_,
@@ -27,6 +29,8 @@ inline metal::float3 sym2_from_eigen(
 }
 
 /// `v v^T`.
+///
+/// Cost on GCN: 3 instructions.
 inline metal::float3 sym2_outer(
     metal::float2 v
 ) {
@@ -34,6 +38,8 @@ inline metal::float3 sym2_outer(
 }
 
 /// Determinant of a 2×2 matrix.
+///
+/// Cost on GCN: 2 instructions.
 inline float sym2_det(
     metal::float3 a
 ) {
@@ -41,6 +47,8 @@ inline float sym2_det(
 }
 
 /// Trace of a 2×2 matrix.
+///
+/// Cost on GCN: 1 instruction.
 inline float sym2_trace(
     metal::float3 a
 ) {
@@ -48,6 +56,8 @@ inline float sym2_trace(
 }
 
 /// `v^T A v`.
+///
+/// Cost on GCN: 7 instructions.
 inline float sym2_quadratic(
     metal::float3 a,
     metal::float2 v
@@ -58,6 +68,8 @@ inline float sym2_quadratic(
 /// Eigenvalues and axis of a positive semi-definite matrix, both at least zero. The axis has x ≥ 0 (and y = +1
 /// where x = 0) and is (1, 0) when both eigenvalues are equal. The smaller is `det / larger`, which keeps its digits
 /// where the textbook's half difference cancels.
+///
+/// Cost on GCN: 33 instructions (5 at a quarter of the rate).
 inline SymEigen sym2_eigen(
     metal::float3 a
 ) {
@@ -85,6 +97,8 @@ inline SymEigen sym2_eigen(
 
 /// The same eigenvectors with both eigenvalues clamped to `[lo, hi]`, `lo` ≥ 0. A matrix within the range comes back
 /// as it is.
+///
+/// Cost on GCN: 54 instructions (5 at a quarter of the rate).
 inline metal::float3 sym2_clamp_eigen(
     metal::float3 a,
     float lo,
@@ -104,6 +118,8 @@ inline metal::float3 sym2_clamp_eigen(
 
 /// The positive semi-definite square root of a positive semi-definite matrix:
 /// `(A + sqrt(det) I) / sqrt(trace + 2 sqrt(det))`, by Cayley–Hamilton.
+///
+/// Cost on GCN: 17 instructions (3 at a quarter of the rate).
 inline metal::float3 sym2_sqrt(
     metal::float3 a
 ) {
@@ -118,6 +134,8 @@ inline metal::float3 sym2_sqrt(
 }
 
 /// `v^T A v`.
+///
+/// Cost on GCN: 12 instructions.
 inline float sym3_quadratic(
     metal::float3x3 a,
     metal::float3 v
@@ -126,6 +144,8 @@ inline float sym3_quadratic(
 }
 
 /// Trace of a 3×3 matrix.
+///
+/// Cost on GCN: 2 instructions.
 inline float sym3_trace(
     metal::float3x3 a
 ) {
@@ -133,6 +153,8 @@ inline float sym3_trace(
 }
 
 /// The adjugate of a symmetric matrix: `A adj(A) = det(A) I`. Its columns are the cross products of A's.
+///
+/// Cost on GCN: 18 instructions.
 inline metal::float3x3 sym3_adjugate(
     metal::float3x3 a
 ) {
@@ -140,6 +162,8 @@ inline metal::float3x3 sym3_adjugate(
 }
 
 /// Determinant of a symmetric 3×3 matrix.
+///
+/// Cost on GCN: 9 instructions.
 inline float sym3_det(
     metal::float3x3 a
 ) {

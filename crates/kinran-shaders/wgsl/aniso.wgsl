@@ -12,11 +12,15 @@
 const ALPHA_MIN: f32 = 0.00392156862745098;
 
 /// GGX alpha of a perceptual roughness in [0, 1]: its square, at least ALPHA_MIN.
+///
+/// Cost on GCN: 2 instructions.
 fn alpha_from_roughness(roughness: f32) -> f32 {
     return max(roughness * roughness, ALPHA_MIN);
 }
 
 /// GGX alpha of a gloss in [0, 1]: `(1 - gloss)²`, at least ALPHA_MIN.
+///
+/// Cost on GCN: 3 instructions.
 fn alpha_from_gloss(gloss: f32) -> f32 {
     return alpha_from_roughness(1.0 - gloss);
 }
@@ -34,6 +38,8 @@ struct AnisoDecoded {
 }
 
 /// Texel of a squared roughness matrix `s` (xx, xy, yy); each component in [0, 1]. rho is 0 where Sxx or Syy is 0.
+///
+/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 fn aniso_encode(s: vec3f) -> vec3f {
     let product = s.x * s.z;
     let rho = select(0.0, clamp(s.y * inverseSqrt(product), -1.0, 1.0), product > 0.0);
@@ -44,6 +50,8 @@ fn aniso_encode(s: vec3f) -> vec3f {
 ///
 /// With `ggx_matrix_d` and `smith_matrix_v` this is all the decoding a light needs: cheaper than `aniso_decode` for a
 /// few lights. Add `sym2_clamp_eigen` where a determinant of zero would divide.
+///
+/// Cost on GCN: 5 instructions.
 fn aniso_decode_matrix(texel: vec3f) -> vec3f {
     return vec3f(texel.x * texel.x, texel.x * (texel.y * 2.0 - 1.0) * texel.z, texel.z * texel.z);
 }
@@ -55,6 +63,8 @@ fn aniso_decode_matrix(texel: vec3f) -> vec3f {
 /// slide's half difference cancels. And Sxy = 0 counts as positive: with HLSL's `sign`, which is zero there, the
 /// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
 /// 0.03° of the exact one.
+///
+/// Cost on GCN: 36 instructions (5 at a quarter of the rate).
 fn aniso_decode(texel: vec3f, tangent: vec3f, bitangent: vec3f) -> AnisoDecoded {
     let rho = texel.y * 2.0 - 1.0;
     let product = texel.x * texel.z;
@@ -62,8 +72,9 @@ fn aniso_decode(texel: vec3f, tangent: vec3f, bitangent: vec3f) -> AnisoDecoded 
     // The grain of 1e-12 gives a round lobe the axis (1, 0) and touches no other.
     let sxx = texel.x * texel.x + 1e-12;
     let syy = texel.z * texel.z;
-    let difference = sxx - syy;
-    let discr_sqr = difference * difference + 4.0 * sxy * sxy;
+    // Factors of a power of two stand where GCN has them for nothing, on the result of another instruction.
+    let half_difference = 0.5 * (sxx - syy);
+    let discr_sqr = 4.0 * (half_difference * half_difference + sxy * sxy);
     let discr_rcp = inverseSqrt(discr_sqr);
 
     let alpha_t_sqr = 0.5 * (sxx + syy + discr_sqr * discr_rcp);
@@ -71,7 +82,7 @@ fn aniso_decode(texel: vec3f, tangent: vec3f, bitangent: vec3f) -> AnisoDecoded 
     let alpha_t = alpha_t_sqr * alpha_t_rcp;
     let alpha_b = product * sqrt(1.0 - rho * rho) * alpha_t_rcp;
 
-    let c_sqr = saturate(0.5 * difference * discr_rcp + 0.5);
+    let c_sqr = saturate(half_difference * discr_rcp + 0.5);
     let c = sqrt(c_sqr);
     let s_abs = sqrt(1.0 - c_sqr);
     let s = select(s_abs, -s_abs, sxy < 0.0);
@@ -85,12 +96,16 @@ fn aniso_decode(texel: vec3f, tangent: vec3f, bitangent: vec3f) -> AnisoDecoded 
 
 /// Squared roughness matrix (xx, xy, yy) with `alpha_t` along the unit vector `axis` of the `m_n` frame, `alpha_b`
 /// across.
+///
+/// Cost on GCN: 13 instructions.
 fn aniso_from_alphas(alpha_t: f32, alpha_b: f32, axis: vec2f) -> vec3f {
     return sym2_from_eigen(alpha_t * alpha_t, alpha_b * alpha_b, axis);
 }
 
 /// Direction in the `m_n` frame of a direction painted in the mesh's tangent plane: what Gram–Schmidt, `d - (d·n) n`,
 /// makes of it. Both are unit vectors; where nothing is left of it, the direction stays as it is.
+///
+/// Cost on GCN: 23 instructions (2 at a quarter of the rate).
 fn axis_from_direction(direction: vec2f, n: vec3f) -> vec2f {
     // The columns of m_n are orthogonal to n, so the Gram–Schmidt term drops out of both products.
     let m = m_n(n);
@@ -101,6 +116,8 @@ fn axis_from_direction(direction: vec2f, n: vec3f) -> vec2f {
 
 /// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
 /// turns into `axis` of the `m_n` frame.
+///
+/// Cost on GCN: 31 instructions (2 at a quarter of the rate).
 fn direction_from_axis(axis: vec2f, n: vec3f) -> vec2f {
     let m = m_n(n);
     let t = m[0] * axis.x + m[1] * axis.y;
@@ -112,6 +129,8 @@ fn direction_from_axis(axis: vec2f, n: vec3f) -> vec2f {
 
 /// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
 /// `alpha_t = mix(alpha_b, 1, strength²)`.
+///
+/// Cost on GCN: 5 instructions.
 fn alphas_from_khr_anisotropy(roughness: f32, strength: f32) -> vec2f {
     let alpha_b = alpha_from_roughness(roughness);
     return vec2f(alpha_b + (1.0 - alpha_b) * strength * strength, alpha_b);
@@ -119,6 +138,8 @@ fn alphas_from_khr_anisotropy(roughness: f32, strength: f32) -> vec2f {
 
 /// Perceptual roughness and anisotropy strength of `KHR_materials_anisotropy` for `alpha_t ≥ alpha_b`; the inverse of
 /// `alphas_from_khr_anisotropy`.
+///
+/// Cost on GCN: 8 instructions (3 at a quarter of the rate).
 fn khr_anisotropy_from_alphas(alpha_t: f32, alpha_b: f32) -> vec2f {
     let rest = 1.0 - alpha_b;
     let strength = select(0.0, sqrt(saturate((alpha_t - alpha_b) / rest)), rest > 0.0);

@@ -19,6 +19,8 @@ const FRAC_1_PI: f32 = 0.31830988618379067;
 
 /// Isotropic distribution of microfacet normals per steradian, `n_h = n·h` (Walter 2007, eq. 33). One ulp of `n_h`
 /// moves the peak by `2.4e-7 / alpha²`; where that matters, `ggx_aniso_d` has all the digits.
+///
+/// Cost on GCN: 10 instructions (1 at a quarter of the rate).
 fn ggx_d(n_h: f32, alpha: f32) -> f32 {
     let a_sqr = alpha * alpha;
     // 1 - n_h² as a product, which does not round before it cancels.
@@ -28,6 +30,8 @@ fn ggx_d(n_h: f32, alpha: f32) -> f32 {
 
 /// Anisotropic distribution of microfacet normals per steradian (slide: Our Algorithm, the form with
 /// `(alpha_t alpha_b)^3`), for `h` in the upper hemisphere. Its integral against n·h over there is one.
+///
+/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
 fn ggx_aniso_d(h: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
     let alpha_tb = alpha_t * alpha_b;
     let v = vec3f(h.x * alpha_b, h.y * alpha_t, h.z * alpha_tb);
@@ -37,6 +41,8 @@ fn ggx_aniso_d(h: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
 
 /// `ggx_aniso_d` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode:
 /// `|A|^(3/2) / (π (h.xy^T adj(A) h.xy + |A| h.z²)²)`. `|A|` must be positive.
+///
+/// Cost on GCN: 17 instructions (2 at a quarter of the rate).
 fn ggx_matrix_d(h: vec3f, a: vec3f) -> f32 {
     let det = sym2_det(a);
     let w = det / (sym2_quadratic(vec3f(a.z, -a.y, a.x), h.xy) + det * h.z * h.z);
@@ -45,11 +51,15 @@ fn ggx_matrix_d(h: vec3f, a: vec3f) -> f32 {
 
 /// Visibility from the two terms of `2 n·u n·v (1 + Λ(u) + Λ(v))`: `n·v |u'|` and `n·u |v'|`, where the prime
 /// stretches a direction by the roughness. Finite, and meaningless, where both directions graze.
+///
+/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 fn smith_v_of_terms(u: f32, v: f32) -> f32 {
     return 0.5 / max(u + v, MIN_POSITIVE);
 }
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, isotropic (Heitz 2014, eq. 99).
+///
+/// Cost on GCN: 12 instructions (3 at a quarter of the rate).
 fn smith_v(n_u: f32, n_v: f32, alpha: f32) -> f32 {
     let a_sqr = alpha * alpha;
     let v = n_u * sqrt(n_v * n_v * (1.0 - a_sqr) + a_sqr);
@@ -59,12 +69,16 @@ fn smith_v(n_u: f32, n_v: f32, alpha: f32) -> f32 {
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, anisotropic (Heitz 2014, eq. 99 with the lambda of section
 /// 5.3). `u` and `v` lie in the upper hemisphere.
+///
+/// Cost on GCN: 16 instructions (3 at a quarter of the rate).
 fn smith_aniso_v(u: vec3f, v: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
     let stretch = vec3f(alpha_t, alpha_b, 1.0);
     return smith_v_of_terms(v.z * length(u * stretch), u.z * length(v * stretch));
 }
 
 /// `smith_aniso_v` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode.
+///
+/// Cost on GCN: 21 instructions (3 at a quarter of the rate).
 fn smith_matrix_v(u: vec3f, v: vec3f, a: vec3f) -> f32 {
     let stretched_u = sqrt(sym2_quadratic(a, u.xy) + u.z * u.z);
     let stretched_v = sqrt(sym2_quadratic(a, v.xy) + v.z * v.z);
@@ -72,11 +86,15 @@ fn smith_matrix_v(u: vec3f, v: vec3f, a: vec3f) -> f32 {
 }
 
 /// Smith masking of `v` alone, 0 to 1 (Heitz 2014, eq. 43).
+///
+/// Cost on GCN: 10 instructions (2 at a quarter of the rate).
 fn smith_aniso_g1(v: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
     return 2.0 * v.z / (v.z + length(v * vec3f(alpha_t, alpha_b, 1.0)));
 }
 
 /// Fresnel reflectance by Schlick's approximation (1994) from `f0` at normal incidence to one at grazing.
+///
+/// Cost on GCN: 10 instructions.
 fn schlick_f(f0: vec3f, v_h: f32) -> vec3f {
     let m = saturate(1.0 - v_h);
     let m_sqr = m * m;
@@ -85,6 +103,8 @@ fn schlick_f(f0: vec3f, v_h: f32) -> vec3f {
 
 /// A microfacet normal distributed as `ggx_vndf_pdf` for the view direction `v`, from two uniform numbers in [0, 1)
 /// (Dupuy, Benyoub 2023, listing 3).
+///
+/// Cost on GCN: 32 instructions (5 at a quarter of the rate).
 fn ggx_vndf_sample(v: vec3f, alpha_t: f32, alpha_b: f32, xi: vec2f) -> vec3f {
     let stretch = vec3f(alpha_t, alpha_b, 1.0);
     let v_std = normalize(v * stretch);
@@ -103,6 +123,8 @@ fn ggx_vndf_sample(v: vec3f, alpha_t: f32, alpha_b: f32, xi: vec2f) -> vec3f {
 
 /// Density per steradian of microfacet normals visible from `v`: `G1(v) max(v·h, 0) D(h) / n·v` (Heitz 2014, eq. 16).
 /// Divide by `4 v·h` for the density of the reflected direction.
+///
+/// Cost on GCN: 29 instructions (3 at a quarter of the rate).
 fn ggx_vndf_pdf(v: vec3f, h: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
     if h.z <= 0.0 {
         return 0.0;

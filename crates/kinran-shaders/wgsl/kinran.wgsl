@@ -9,17 +9,23 @@
 
 /// Beckmann's sigma, the standard deviation of slopes, that stands for a GGX alpha (slide: LEAN Mapping):
 /// `alpha / sqrt(2)`.
+///
+/// Cost on GCN: 1 instruction.
 fn sigma_from_alpha(alpha: f32) -> f32 {
     return alpha * 0.70710678;
 }
 
 /// The inverse of `sigma_from_alpha`.
+///
+/// Cost on GCN: 1 instruction.
 fn alpha_from_sigma(sigma: f32) -> f32 {
     return sigma * 1.41421356;
 }
 
 /// Distribution of microfacet normals per steradian with slope deviations `sigma_t`, `sigma_b` along x and y
 /// (Beckmann 1963): `exp(-(x²/σt² + y²/σb²) / (2 z²)) / (2π σt σb z⁴)`, zero below the horizon.
+///
+/// Cost on GCN: 20 instructions (5 at a quarter of the rate).
 fn beckmann_aniso_d(h: vec3f, sigma_t: f32, sigma_b: f32) -> f32 {
     // z⁴ underflows long after the exponential has: at z = 1e-6 it is exp(-5e11 / sigma²).
     if h.z <= 1e-6 {
@@ -32,11 +38,15 @@ fn beckmann_aniso_d(h: vec3f, sigma_t: f32, sigma_b: f32) -> f32 {
 }
 
 /// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
+///
+/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 fn slope_from_normal(n: vec3f) -> vec2f {
     return n.xy / n.z;
 }
 
 /// Unit normal of a slope.
+///
+/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 fn normal_from_slope(slope: vec2f) -> vec3f {
     return vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
 }
@@ -52,6 +62,8 @@ fn normal_from_slope(slope: vec2f) -> vec3f {
 /// Its first two columns are the tangent and bitangent of every aniso texel; a Gram–Schmidt tangent differs from them
 /// by 0.44° at a tilt of 10° and 18° at 60°, so decode with these. Orthonormal to 3e-7 for n.z ≥ 0; where `1 + n.z`
 /// is below 1e-6 the half turn about x is returned, whose third column is −z.
+///
+/// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 fn m_n(n: vec3f) -> mat3x3f {
     let d = 1.0 + n.z;
     if d < 1e-6 {
@@ -64,6 +76,8 @@ fn m_n(n: vec3f) -> mat3x3f {
 
 /// A unit normal from the xy of a normal map, each in [−1, 1]. Where x² + y² exceeds one, as compression and
 /// filtering make it do, the normal lies on the horizon in the same direction.
+///
+/// Cost on GCN: 8 instructions (2 at a quarter of the rate).
 fn normal_from_xy(x: f32, y: f32) -> vec3f {
     let xy_squared = x * x + y * y;
     let scale = inverseSqrt(max(xy_squared, 1.0));
@@ -81,6 +95,8 @@ fn normal_from_xy(x: f32, y: f32) -> vec3f {
 /// Directional albedo of the single-scattering GGX lobe with height-correlated Smith masking and F = 1, for a view at
 /// cosine `n_v` (0 to 1): the share of a white furnace that comes back, 0.307 (= 1 − ln 2) to 1. A rational fit,
 /// within 0.011 of quadrature (0.004 RMS) for alpha and n_v in [0.005, 1]; it takes the place of a lookup table.
+///
+/// Cost on GCN: 27 instructions (1 at a quarter of the rate).
 fn ggx_directional_albedo(n_v: f32, alpha: f32) -> f32 {
     let m = n_v;
     let a = alpha;
@@ -98,6 +114,8 @@ fn ggx_directional_albedo(n_v: f32, alpha: f32) -> f32 {
 /// Factor on the single-scattering lobe that restores the energy of all further bounces, `1 + f0 (1/E - 1)` (Turquin
 /// 2019, eq. 16), per pixel. The factor depends on the view alone, so the compensated lobe is not reciprocal. An
 /// anisotropic lobe uses the isotropic albedo at `alpha = sqrt((alpha_t² + alpha_b²)/2)`.
+///
+/// Cost on GCN: 38 instructions (3 at a quarter of the rate).
 fn multiscatter_compensation(f0: vec3f, n_v: f32, alpha_t: f32, alpha_b: f32) -> vec3f {
     let alpha = sqrt(0.5 * (alpha_t * alpha_t + alpha_b * alpha_b));
     let e = ggx_directional_albedo(saturate(n_v), alpha);
@@ -116,6 +134,8 @@ fn multiscatter_compensation(f0: vec3f, n_v: f32, alpha_t: f32, alpha_b: f32) ->
 // over the sphere, its polar axis is z, without the Condon-Shortley phase.
 
 /// The basis functions at a unit direction.
+///
+/// Cost on GCN: 14 instructions.
 fn sh_basis(direction: vec3f) -> array<f32, 9> {
     let x = direction.x;
     let y = direction.y;
@@ -134,6 +154,8 @@ fn sh_basis(direction: vec3f) -> array<f32, 9> {
 }
 
 /// The function that the coefficients stand for, at a unit direction; negative where it rings.
+///
+/// Cost on GCN: 41 instructions.
 fn sh_evaluate(coefficients: array<vec3f, 9>, direction: vec3f) -> vec3f {
     let basis = sh_basis(direction);
     return coefficients[0] * basis[0] + coefficients[1] * basis[1] + coefficients[2] * basis[2]
@@ -143,6 +165,8 @@ fn sh_evaluate(coefficients: array<vec3f, 9>, direction: vec3f) -> vec3f {
 
 /// Coefficients of irradiance from those of radiance (eq. 7), once per environment; `sh_evaluate` of the result is
 /// `sh_irradiance`, three multiplications a coefficient cheaper.
+///
+/// Cost on GCN: 27 instructions.
 fn sh_convolve_cosine(radiance: array<vec3f, 9>) -> array<vec3f, 9> {
     // sqrt(4 pi / (2l + 1)) times the clamped cosine's own coefficient: π, 2π/3, π/4.
     let band_zero = 3.14159265;
@@ -163,6 +187,8 @@ fn sh_convolve_cosine(radiance: array<vec3f, 9>) -> array<vec3f, 9> {
 
 /// Irradiance on a surface with unit `normal`, the integral of radiance times the clamped cosine. Light from one small
 /// spot can make it slightly negative on the far side; clamp where that matters.
+///
+/// Cost on GCN: 65 instructions.
 fn sh_irradiance(radiance: array<vec3f, 9>, normal: vec3f) -> vec3f {
     return sh_evaluate(sh_convolve_cosine(radiance), normal);
 }
@@ -175,6 +201,8 @@ fn sh_irradiance(radiance: array<vec3f, 9>, normal: vec3f) -> vec3f {
 // one is a mat3x3f.
 
 /// The 2×2 matrix with eigenvalue `l1` along the unit vector `axis` and `l2` across it.
+///
+/// Cost on GCN: 11 instructions.
 fn sym2_from_eigen(l1: f32, l2: f32, axis: vec2f) -> vec3f {
     return vec3f(
         l1 * axis.x * axis.x + l2 * axis.y * axis.y,
@@ -184,21 +212,29 @@ fn sym2_from_eigen(l1: f32, l2: f32, axis: vec2f) -> vec3f {
 }
 
 /// `v v^T`.
+///
+/// Cost on GCN: 3 instructions.
 fn sym2_outer(v: vec2f) -> vec3f {
     return vec3f(v.x * v.x, v.x * v.y, v.y * v.y);
 }
 
 /// Determinant of a 2×2 matrix.
+///
+/// Cost on GCN: 2 instructions.
 fn sym2_det(a: vec3f) -> f32 {
     return a.x * a.z - a.y * a.y;
 }
 
 /// Trace of a 2×2 matrix.
+///
+/// Cost on GCN: 1 instruction.
 fn sym2_trace(a: vec3f) -> f32 {
     return a.x + a.z;
 }
 
 /// `v^T A v`.
+///
+/// Cost on GCN: 7 instructions.
 fn sym2_quadratic(a: vec3f, v: vec2f) -> f32 {
     return a.x * v.x * v.x + 2.0 * a.y * v.x * v.y + a.z * v.y * v.y;
 }
@@ -216,6 +252,8 @@ struct SymEigen {
 /// Eigenvalues and axis of a positive semi-definite matrix, both at least zero. The axis has x ≥ 0 (and y = +1
 /// where x = 0) and is (1, 0) when both eigenvalues are equal. The smaller is `det / larger`, which keeps its digits
 /// where the textbook's half difference cancels.
+///
+/// Cost on GCN: 33 instructions (5 at a quarter of the rate).
 fn sym2_eigen(a: vec3f) -> SymEigen {
     let half_difference = 0.5 * (a.x - a.z);
     let radius = sqrt(half_difference * half_difference + a.y * a.y);
@@ -236,6 +274,8 @@ fn sym2_eigen(a: vec3f) -> SymEigen {
 
 /// The same eigenvectors with both eigenvalues clamped to `[lo, hi]`, `lo` ≥ 0. A matrix within the range comes back
 /// as it is.
+///
+/// Cost on GCN: 54 instructions (5 at a quarter of the rate).
 fn sym2_clamp_eigen(a: vec3f, lo: f32, hi: f32) -> vec3f {
     let e = sym2_eigen(a);
     let clamped = sym2_from_eigen(clamp(e.larger, lo, hi), clamp(e.smaller, lo, hi), e.axis);
@@ -244,6 +284,8 @@ fn sym2_clamp_eigen(a: vec3f, lo: f32, hi: f32) -> vec3f {
 
 /// The positive semi-definite square root of a positive semi-definite matrix:
 /// `(A + sqrt(det) I) / sqrt(trace + 2 sqrt(det))`, by Cayley–Hamilton.
+///
+/// Cost on GCN: 17 instructions (3 at a quarter of the rate).
 fn sym2_sqrt(a: vec3f) -> vec3f {
     let root_det = sqrt(max(sym2_det(a), 0.0));
     let scale = sqrt(sym2_trace(a) + 2.0 * root_det);
@@ -254,21 +296,29 @@ fn sym2_sqrt(a: vec3f) -> vec3f {
 }
 
 /// `v^T A v`.
+///
+/// Cost on GCN: 12 instructions.
 fn sym3_quadratic(a: mat3x3f, v: vec3f) -> f32 {
     return dot(v, a * v);
 }
 
 /// Trace of a 3×3 matrix.
+///
+/// Cost on GCN: 2 instructions.
 fn sym3_trace(a: mat3x3f) -> f32 {
     return a[0].x + a[1].y + a[2].z;
 }
 
 /// The adjugate of a symmetric matrix: `A adj(A) = det(A) I`. Its columns are the cross products of A's.
+///
+/// Cost on GCN: 18 instructions.
 fn sym3_adjugate(a: mat3x3f) -> mat3x3f {
     return mat3x3f(cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]));
 }
 
 /// Determinant of a symmetric 3×3 matrix.
+///
+/// Cost on GCN: 9 instructions.
 fn sym3_det(a: mat3x3f) -> f32 {
     return dot(a[0], cross(a[1], a[2]));
 }
@@ -287,11 +337,15 @@ fn sym3_det(a: mat3x3f) -> f32 {
 const ALPHA_MIN: f32 = 0.00392156862745098;
 
 /// GGX alpha of a perceptual roughness in [0, 1]: its square, at least ALPHA_MIN.
+///
+/// Cost on GCN: 2 instructions.
 fn alpha_from_roughness(roughness: f32) -> f32 {
     return max(roughness * roughness, ALPHA_MIN);
 }
 
 /// GGX alpha of a gloss in [0, 1]: `(1 - gloss)²`, at least ALPHA_MIN.
+///
+/// Cost on GCN: 3 instructions.
 fn alpha_from_gloss(gloss: f32) -> f32 {
     return alpha_from_roughness(1.0 - gloss);
 }
@@ -309,6 +363,8 @@ struct AnisoDecoded {
 }
 
 /// Texel of a squared roughness matrix `s` (xx, xy, yy); each component in [0, 1]. rho is 0 where Sxx or Syy is 0.
+///
+/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 fn aniso_encode(s: vec3f) -> vec3f {
     let product = s.x * s.z;
     let rho = select(0.0, clamp(s.y * inverseSqrt(product), -1.0, 1.0), product > 0.0);
@@ -319,6 +375,8 @@ fn aniso_encode(s: vec3f) -> vec3f {
 ///
 /// With `ggx_matrix_d` and `smith_matrix_v` this is all the decoding a light needs: cheaper than `aniso_decode` for a
 /// few lights. Add `sym2_clamp_eigen` where a determinant of zero would divide.
+///
+/// Cost on GCN: 5 instructions.
 fn aniso_decode_matrix(texel: vec3f) -> vec3f {
     return vec3f(texel.x * texel.x, texel.x * (texel.y * 2.0 - 1.0) * texel.z, texel.z * texel.z);
 }
@@ -330,6 +388,8 @@ fn aniso_decode_matrix(texel: vec3f) -> vec3f {
 /// slide's half difference cancels. And Sxy = 0 counts as positive: with HLSL's `sign`, which is zero there, the
 /// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
 /// 0.03° of the exact one.
+///
+/// Cost on GCN: 36 instructions (5 at a quarter of the rate).
 fn aniso_decode(texel: vec3f, tangent: vec3f, bitangent: vec3f) -> AnisoDecoded {
     let rho = texel.y * 2.0 - 1.0;
     let product = texel.x * texel.z;
@@ -337,8 +397,9 @@ fn aniso_decode(texel: vec3f, tangent: vec3f, bitangent: vec3f) -> AnisoDecoded 
     // The grain of 1e-12 gives a round lobe the axis (1, 0) and touches no other.
     let sxx = texel.x * texel.x + 1e-12;
     let syy = texel.z * texel.z;
-    let difference = sxx - syy;
-    let discr_sqr = difference * difference + 4.0 * sxy * sxy;
+    // Factors of a power of two stand where GCN has them for nothing, on the result of another instruction.
+    let half_difference = 0.5 * (sxx - syy);
+    let discr_sqr = 4.0 * (half_difference * half_difference + sxy * sxy);
     let discr_rcp = inverseSqrt(discr_sqr);
 
     let alpha_t_sqr = 0.5 * (sxx + syy + discr_sqr * discr_rcp);
@@ -346,7 +407,7 @@ fn aniso_decode(texel: vec3f, tangent: vec3f, bitangent: vec3f) -> AnisoDecoded 
     let alpha_t = alpha_t_sqr * alpha_t_rcp;
     let alpha_b = product * sqrt(1.0 - rho * rho) * alpha_t_rcp;
 
-    let c_sqr = saturate(0.5 * difference * discr_rcp + 0.5);
+    let c_sqr = saturate(half_difference * discr_rcp + 0.5);
     let c = sqrt(c_sqr);
     let s_abs = sqrt(1.0 - c_sqr);
     let s = select(s_abs, -s_abs, sxy < 0.0);
@@ -360,12 +421,16 @@ fn aniso_decode(texel: vec3f, tangent: vec3f, bitangent: vec3f) -> AnisoDecoded 
 
 /// Squared roughness matrix (xx, xy, yy) with `alpha_t` along the unit vector `axis` of the `m_n` frame, `alpha_b`
 /// across.
+///
+/// Cost on GCN: 13 instructions.
 fn aniso_from_alphas(alpha_t: f32, alpha_b: f32, axis: vec2f) -> vec3f {
     return sym2_from_eigen(alpha_t * alpha_t, alpha_b * alpha_b, axis);
 }
 
 /// Direction in the `m_n` frame of a direction painted in the mesh's tangent plane: what Gram–Schmidt, `d - (d·n) n`,
 /// makes of it. Both are unit vectors; where nothing is left of it, the direction stays as it is.
+///
+/// Cost on GCN: 23 instructions (2 at a quarter of the rate).
 fn axis_from_direction(direction: vec2f, n: vec3f) -> vec2f {
     // The columns of m_n are orthogonal to n, so the Gram–Schmidt term drops out of both products.
     let m = m_n(n);
@@ -376,6 +441,8 @@ fn axis_from_direction(direction: vec2f, n: vec3f) -> vec2f {
 
 /// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
 /// turns into `axis` of the `m_n` frame.
+///
+/// Cost on GCN: 31 instructions (2 at a quarter of the rate).
 fn direction_from_axis(axis: vec2f, n: vec3f) -> vec2f {
     let m = m_n(n);
     let t = m[0] * axis.x + m[1] * axis.y;
@@ -387,6 +454,8 @@ fn direction_from_axis(axis: vec2f, n: vec3f) -> vec2f {
 
 /// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
 /// `alpha_t = mix(alpha_b, 1, strength²)`.
+///
+/// Cost on GCN: 5 instructions.
 fn alphas_from_khr_anisotropy(roughness: f32, strength: f32) -> vec2f {
     let alpha_b = alpha_from_roughness(roughness);
     return vec2f(alpha_b + (1.0 - alpha_b) * strength * strength, alpha_b);
@@ -394,6 +463,8 @@ fn alphas_from_khr_anisotropy(roughness: f32, strength: f32) -> vec2f {
 
 /// Perceptual roughness and anisotropy strength of `KHR_materials_anisotropy` for `alpha_t ≥ alpha_b`; the inverse of
 /// `alphas_from_khr_anisotropy`.
+///
+/// Cost on GCN: 8 instructions (3 at a quarter of the rate).
 fn khr_anisotropy_from_alphas(alpha_t: f32, alpha_b: f32) -> vec2f {
     let rest = 1.0 - alpha_b;
     let strength = select(0.0, sqrt(saturate((alpha_t - alpha_b) / rest)), rest > 0.0);
@@ -421,6 +492,8 @@ const FRAC_1_PI: f32 = 0.31830988618379067;
 
 /// Isotropic distribution of microfacet normals per steradian, `n_h = n·h` (Walter 2007, eq. 33). One ulp of `n_h`
 /// moves the peak by `2.4e-7 / alpha²`; where that matters, `ggx_aniso_d` has all the digits.
+///
+/// Cost on GCN: 10 instructions (1 at a quarter of the rate).
 fn ggx_d(n_h: f32, alpha: f32) -> f32 {
     let a_sqr = alpha * alpha;
     // 1 - n_h² as a product, which does not round before it cancels.
@@ -430,6 +503,8 @@ fn ggx_d(n_h: f32, alpha: f32) -> f32 {
 
 /// Anisotropic distribution of microfacet normals per steradian (slide: Our Algorithm, the form with
 /// `(alpha_t alpha_b)^3`), for `h` in the upper hemisphere. Its integral against n·h over there is one.
+///
+/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
 fn ggx_aniso_d(h: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
     let alpha_tb = alpha_t * alpha_b;
     let v = vec3f(h.x * alpha_b, h.y * alpha_t, h.z * alpha_tb);
@@ -439,6 +514,8 @@ fn ggx_aniso_d(h: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
 
 /// `ggx_aniso_d` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode:
 /// `|A|^(3/2) / (π (h.xy^T adj(A) h.xy + |A| h.z²)²)`. `|A|` must be positive.
+///
+/// Cost on GCN: 17 instructions (2 at a quarter of the rate).
 fn ggx_matrix_d(h: vec3f, a: vec3f) -> f32 {
     let det = sym2_det(a);
     let w = det / (sym2_quadratic(vec3f(a.z, -a.y, a.x), h.xy) + det * h.z * h.z);
@@ -447,11 +524,15 @@ fn ggx_matrix_d(h: vec3f, a: vec3f) -> f32 {
 
 /// Visibility from the two terms of `2 n·u n·v (1 + Λ(u) + Λ(v))`: `n·v |u'|` and `n·u |v'|`, where the prime
 /// stretches a direction by the roughness. Finite, and meaningless, where both directions graze.
+///
+/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 fn smith_v_of_terms(u: f32, v: f32) -> f32 {
     return 0.5 / max(u + v, MIN_POSITIVE);
 }
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, isotropic (Heitz 2014, eq. 99).
+///
+/// Cost on GCN: 12 instructions (3 at a quarter of the rate).
 fn smith_v(n_u: f32, n_v: f32, alpha: f32) -> f32 {
     let a_sqr = alpha * alpha;
     let v = n_u * sqrt(n_v * n_v * (1.0 - a_sqr) + a_sqr);
@@ -461,12 +542,16 @@ fn smith_v(n_u: f32, n_v: f32, alpha: f32) -> f32 {
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, anisotropic (Heitz 2014, eq. 99 with the lambda of section
 /// 5.3). `u` and `v` lie in the upper hemisphere.
+///
+/// Cost on GCN: 16 instructions (3 at a quarter of the rate).
 fn smith_aniso_v(u: vec3f, v: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
     let stretch = vec3f(alpha_t, alpha_b, 1.0);
     return smith_v_of_terms(v.z * length(u * stretch), u.z * length(v * stretch));
 }
 
 /// `smith_aniso_v` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode.
+///
+/// Cost on GCN: 21 instructions (3 at a quarter of the rate).
 fn smith_matrix_v(u: vec3f, v: vec3f, a: vec3f) -> f32 {
     let stretched_u = sqrt(sym2_quadratic(a, u.xy) + u.z * u.z);
     let stretched_v = sqrt(sym2_quadratic(a, v.xy) + v.z * v.z);
@@ -474,11 +559,15 @@ fn smith_matrix_v(u: vec3f, v: vec3f, a: vec3f) -> f32 {
 }
 
 /// Smith masking of `v` alone, 0 to 1 (Heitz 2014, eq. 43).
+///
+/// Cost on GCN: 10 instructions (2 at a quarter of the rate).
 fn smith_aniso_g1(v: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
     return 2.0 * v.z / (v.z + length(v * vec3f(alpha_t, alpha_b, 1.0)));
 }
 
 /// Fresnel reflectance by Schlick's approximation (1994) from `f0` at normal incidence to one at grazing.
+///
+/// Cost on GCN: 10 instructions.
 fn schlick_f(f0: vec3f, v_h: f32) -> vec3f {
     let m = saturate(1.0 - v_h);
     let m_sqr = m * m;
@@ -487,6 +576,8 @@ fn schlick_f(f0: vec3f, v_h: f32) -> vec3f {
 
 /// A microfacet normal distributed as `ggx_vndf_pdf` for the view direction `v`, from two uniform numbers in [0, 1)
 /// (Dupuy, Benyoub 2023, listing 3).
+///
+/// Cost on GCN: 32 instructions (5 at a quarter of the rate).
 fn ggx_vndf_sample(v: vec3f, alpha_t: f32, alpha_b: f32, xi: vec2f) -> vec3f {
     let stretch = vec3f(alpha_t, alpha_b, 1.0);
     let v_std = normalize(v * stretch);
@@ -505,6 +596,8 @@ fn ggx_vndf_sample(v: vec3f, alpha_t: f32, alpha_b: f32, xi: vec2f) -> vec3f {
 
 /// Density per steradian of microfacet normals visible from `v`: `G1(v) max(v·h, 0) D(h) / n·v` (Heitz 2014, eq. 16).
 /// Divide by `4 v·h` for the density of the reflected direction.
+///
+/// Cost on GCN: 29 instructions (3 at a quarter of the rate).
 fn ggx_vndf_pdf(v: vec3f, h: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
     if h.z <= 0.0 {
         return 0.0;
@@ -540,6 +633,8 @@ struct SlopeDistribution {
 
 /// `S = M_n [A 0; 0 1] M_n^T` (slide: Our Algorithm, step 1): the SGGX matrix of a GGX surface with unit normal `n`
 /// and squared roughness matrix `a` (xx, xy, yy) in the frame of `m_n`.
+///
+/// Cost on GCN: 51 instructions (1 at a quarter of the rate).
 fn sggx_from_ggx(n: vec3f, a: vec3f) -> mat3x3f {
     let m = m_n(n);
     let ax = m[0] * a.x + m[1] * a.y;
@@ -552,6 +647,8 @@ fn sggx_from_ggx(n: vec3f, a: vec3f) -> mat3x3f {
 }
 
 /// Area of the microflakes projected along the unit vector `w`: `sqrt(w^T S w)` (Heitz 2015).
+///
+/// Cost on GCN: 14 instructions (1 at a quarter of the rate).
 fn sggx_projected_area(s: mat3x3f, w: vec3f) -> f32 {
     return sqrt(max(sym3_quadratic(s, w), 0.0));
 }
@@ -559,6 +656,8 @@ fn sggx_projected_area(s: mat3x3f, w: vec3f) -> f32 {
 /// Distribution of microflake normals at the unit vector `h`, a density per steradian over the sphere:
 /// `1 / (π sqrt|S| (h^T S^-1 h)^2)` (Heitz 2015), written as `|S|^(3/2) / (π (h^T adj(S) h)^2)`. `s` must have a
 /// positive determinant. Single precision leaves a relative error of 1e-5 over the smallest eigenvalue.
+///
+/// Cost on GCN: 39 instructions (2 at a quarter of the rate).
 fn sggx_d(s: mat3x3f, h: vec3f) -> f32 {
     let det = sym3_det(s);
     let q = sym3_quadratic(sym3_adjugate(s), h);
@@ -567,6 +666,8 @@ fn sggx_d(s: mat3x3f, h: vec3f) -> f32 {
 
 /// The slope distribution an SGGX matrix with zz > 0 stands for, seen from the z axis: `S / S_zz = [A + m m^T, m;
 /// m^T, 1]`. The slopes follow a bivariate Student-t with two degrees of freedom.
+///
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 fn slopes_from_sggx(s: mat3x3f) -> SlopeDistribution {
     let inv = 1.0 / s[2].z;
     let m = s[2].xy * inv;
@@ -575,6 +676,8 @@ fn slopes_from_sggx(s: mat3x3f) -> SlopeDistribution {
 }
 
 /// The SGGX matrix with zz = 1 of a slope distribution; the inverse of `slopes_from_sggx`.
+///
+/// Cost on GCN: 3 instructions.
 fn sggx_from_slopes(m: vec2f, a: vec3f) -> mat3x3f {
     let xy = a.y + m.x * m.y;
     return mat3x3f(vec3f(a.x + m.x * m.x, xy, m.x), vec3f(xy, a.z + m.y * m.y, m.y), vec3f(m, 1.0));
@@ -583,6 +686,8 @@ fn sggx_from_slopes(m: vec2f, a: vec3f) -> mat3x3f {
 /// The talk's power iteration (slide: Our Algorithm, step 3): `steps` times `n = S n / |S n|` from `start`. The
 /// tangent of the error shrinks by the ratio of the two largest eigenvalues a step; in V grooves steeper than 45° it
 /// leaves the surface for its walls. `sggx_principal_axis` has neither fault.
+///
+/// Cost on GCN: 34 instructions (2 at a quarter of the rate), one round of its loop.
 fn sggx_power_iteration(s: mat3x3f, start: vec3f, steps: u32) -> vec3f {
     let scale = 1.0 / max(sym3_trace(s), 1e-30);
     var n = start;
@@ -595,6 +700,8 @@ fn sggx_power_iteration(s: mat3x3f, start: vec3f, steps: u32) -> vec3f {
 }
 
 /// Squared overlap with the eigenvector of `l`, from the moments m' B m and |B m|² of a deviator of unit size.
+///
+/// Cost on GCN: 7 instructions (1 at a quarter of the rate).
 fn sggx_overlap(l: f32, moment: f32, moment_sqr: f32) -> f32 {
     return (moment_sqr + l * moment + l * l - 3.0) / (3.0 * l * l - 3.0);
 }
@@ -603,6 +710,8 @@ fn sggx_overlap(l: f32, moment: f32, moment_sqr: f32) -> f32 {
 /// Started at the mean normal of a footprint it finds the filtered normal, also where the largest eigenvalue is
 /// another one (V grooves steeper than 45°). Where eigenvalues coincide, to 0.1 % of their spread, it is the
 /// projection of `start` on their space; `start` itself if `s` is a multiple of the identity. No trigonometry.
+///
+/// Cost on GCN: 204 instructions (10 at a quarter of the rate).
 fn sggx_principal_axis(s: mat3x3f, start: vec3f) -> vec3f {
     let sqrt_three = 1.7320508;
     // Sine under which two eigenvalues are one: rounding of r alone makes 3e-4.
@@ -658,6 +767,8 @@ fn sggx_principal_axis(s: mat3x3f, start: vec3f) -> vec3f {
 }
 
 /// `ggx_from_sggx` before the clamp of the roughness.
+///
+/// Cost on GCN: 268 instructions (12 at a quarter of the rate).
 fn ggx_from_sggx_unclamped(s: mat3x3f, mean_normal: vec3f) -> GgxSurface {
     let axis = sggx_principal_axis(s, mean_normal);
     let n = select(axis, -axis, axis.z < 0.0);
@@ -671,6 +782,8 @@ fn ggx_from_sggx_unclamped(s: mat3x3f, mean_normal: vec3f) -> GgxSurface {
 /// Normal and squared roughness matrix of a filtered SGGX matrix (slide: Our Algorithm, step 3). `mean_normal`, a unit
 /// vector, picks the eigenvector as in `sggx_principal_axis`. The normal returned has z ≥ 0, eigenvalues of the
 /// roughness lie in [0, 1]: a microsurface rougher than alpha = 1 is clamped, because no texture can hold it.
+///
+/// Cost on GCN: 321 instructions (17 at a quarter of the rate).
 fn ggx_from_sggx(s: mat3x3f, mean_normal: vec3f) -> GgxSurface {
     let surface = ggx_from_sggx_unclamped(s, mean_normal);
     return GgxSurface(surface.normal, sym2_clamp_eigen(surface.a, 0.0, 1.0));

@@ -25,6 +25,8 @@ struct SlopeDistribution {
 
 /// `S = M_n [A 0; 0 1] M_n^T` (slide: Our Algorithm, step 1): the SGGX matrix of a GGX surface with unit normal `n`
 /// and squared roughness matrix `a` (xx, xy, yy) in the frame of `m_n`.
+///
+/// Cost on GCN: 51 instructions (1 at a quarter of the rate).
 fn sggx_from_ggx(n: vec3f, a: vec3f) -> mat3x3f {
     let m = m_n(n);
     let ax = m[0] * a.x + m[1] * a.y;
@@ -37,6 +39,8 @@ fn sggx_from_ggx(n: vec3f, a: vec3f) -> mat3x3f {
 }
 
 /// Area of the microflakes projected along the unit vector `w`: `sqrt(w^T S w)` (Heitz 2015).
+///
+/// Cost on GCN: 14 instructions (1 at a quarter of the rate).
 fn sggx_projected_area(s: mat3x3f, w: vec3f) -> f32 {
     return sqrt(max(sym3_quadratic(s, w), 0.0));
 }
@@ -44,6 +48,8 @@ fn sggx_projected_area(s: mat3x3f, w: vec3f) -> f32 {
 /// Distribution of microflake normals at the unit vector `h`, a density per steradian over the sphere:
 /// `1 / (π sqrt|S| (h^T S^-1 h)^2)` (Heitz 2015), written as `|S|^(3/2) / (π (h^T adj(S) h)^2)`. `s` must have a
 /// positive determinant. Single precision leaves a relative error of 1e-5 over the smallest eigenvalue.
+///
+/// Cost on GCN: 39 instructions (2 at a quarter of the rate).
 fn sggx_d(s: mat3x3f, h: vec3f) -> f32 {
     let det = sym3_det(s);
     let q = sym3_quadratic(sym3_adjugate(s), h);
@@ -52,6 +58,8 @@ fn sggx_d(s: mat3x3f, h: vec3f) -> f32 {
 
 /// The slope distribution an SGGX matrix with zz > 0 stands for, seen from the z axis: `S / S_zz = [A + m m^T, m;
 /// m^T, 1]`. The slopes follow a bivariate Student-t with two degrees of freedom.
+///
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 fn slopes_from_sggx(s: mat3x3f) -> SlopeDistribution {
     let inv = 1.0 / s[2].z;
     let m = s[2].xy * inv;
@@ -60,6 +68,8 @@ fn slopes_from_sggx(s: mat3x3f) -> SlopeDistribution {
 }
 
 /// The SGGX matrix with zz = 1 of a slope distribution; the inverse of `slopes_from_sggx`.
+///
+/// Cost on GCN: 3 instructions.
 fn sggx_from_slopes(m: vec2f, a: vec3f) -> mat3x3f {
     let xy = a.y + m.x * m.y;
     return mat3x3f(vec3f(a.x + m.x * m.x, xy, m.x), vec3f(xy, a.z + m.y * m.y, m.y), vec3f(m, 1.0));
@@ -68,6 +78,8 @@ fn sggx_from_slopes(m: vec2f, a: vec3f) -> mat3x3f {
 /// The talk's power iteration (slide: Our Algorithm, step 3): `steps` times `n = S n / |S n|` from `start`. The
 /// tangent of the error shrinks by the ratio of the two largest eigenvalues a step; in V grooves steeper than 45° it
 /// leaves the surface for its walls. `sggx_principal_axis` has neither fault.
+///
+/// Cost on GCN: 34 instructions (2 at a quarter of the rate), one round of its loop.
 fn sggx_power_iteration(s: mat3x3f, start: vec3f, steps: u32) -> vec3f {
     let scale = 1.0 / max(sym3_trace(s), 1e-30);
     var n = start;
@@ -80,6 +92,8 @@ fn sggx_power_iteration(s: mat3x3f, start: vec3f, steps: u32) -> vec3f {
 }
 
 /// Squared overlap with the eigenvector of `l`, from the moments m' B m and |B m|² of a deviator of unit size.
+///
+/// Cost on GCN: 7 instructions (1 at a quarter of the rate).
 fn sggx_overlap(l: f32, moment: f32, moment_sqr: f32) -> f32 {
     return (moment_sqr + l * moment + l * l - 3.0) / (3.0 * l * l - 3.0);
 }
@@ -88,6 +102,8 @@ fn sggx_overlap(l: f32, moment: f32, moment_sqr: f32) -> f32 {
 /// Started at the mean normal of a footprint it finds the filtered normal, also where the largest eigenvalue is
 /// another one (V grooves steeper than 45°). Where eigenvalues coincide, to 0.1 % of their spread, it is the
 /// projection of `start` on their space; `start` itself if `s` is a multiple of the identity. No trigonometry.
+///
+/// Cost on GCN: 204 instructions (10 at a quarter of the rate).
 fn sggx_principal_axis(s: mat3x3f, start: vec3f) -> vec3f {
     let sqrt_three = 1.7320508;
     // Sine under which two eigenvalues are one: rounding of r alone makes 3e-4.
@@ -143,6 +159,8 @@ fn sggx_principal_axis(s: mat3x3f, start: vec3f) -> vec3f {
 }
 
 /// `ggx_from_sggx` before the clamp of the roughness.
+///
+/// Cost on GCN: 268 instructions (12 at a quarter of the rate).
 fn ggx_from_sggx_unclamped(s: mat3x3f, mean_normal: vec3f) -> GgxSurface {
     let axis = sggx_principal_axis(s, mean_normal);
     let n = select(axis, -axis, axis.z < 0.0);
@@ -156,6 +174,8 @@ fn ggx_from_sggx_unclamped(s: mat3x3f, mean_normal: vec3f) -> GgxSurface {
 /// Normal and squared roughness matrix of a filtered SGGX matrix (slide: Our Algorithm, step 3). `mean_normal`, a unit
 /// vector, picks the eigenvector as in `sggx_principal_axis`. The normal returned has z ≥ 0, eigenvalues of the
 /// roughness lie in [0, 1]: a microsurface rougher than alpha = 1 is clamped, because no texture can hold it.
+///
+/// Cost on GCN: 321 instructions (17 at a quarter of the rate).
 fn ggx_from_sggx(s: mat3x3f, mean_normal: vec3f) -> GgxSurface {
     let surface = ggx_from_sggx_unclamped(s, mean_normal);
     return GgxSurface(surface.normal, sym2_clamp_eigen(surface.a, 0.0, 1.0));

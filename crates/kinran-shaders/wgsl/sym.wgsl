@@ -6,6 +6,8 @@
 // one is a mat3x3f.
 
 /// The 2×2 matrix with eigenvalue `l1` along the unit vector `axis` and `l2` across it.
+///
+/// Cost on GCN: 11 instructions.
 fn sym2_from_eigen(l1: f32, l2: f32, axis: vec2f) -> vec3f {
     return vec3f(
         l1 * axis.x * axis.x + l2 * axis.y * axis.y,
@@ -15,21 +17,29 @@ fn sym2_from_eigen(l1: f32, l2: f32, axis: vec2f) -> vec3f {
 }
 
 /// `v v^T`.
+///
+/// Cost on GCN: 3 instructions.
 fn sym2_outer(v: vec2f) -> vec3f {
     return vec3f(v.x * v.x, v.x * v.y, v.y * v.y);
 }
 
 /// Determinant of a 2×2 matrix.
+///
+/// Cost on GCN: 2 instructions.
 fn sym2_det(a: vec3f) -> f32 {
     return a.x * a.z - a.y * a.y;
 }
 
 /// Trace of a 2×2 matrix.
+///
+/// Cost on GCN: 1 instruction.
 fn sym2_trace(a: vec3f) -> f32 {
     return a.x + a.z;
 }
 
 /// `v^T A v`.
+///
+/// Cost on GCN: 7 instructions.
 fn sym2_quadratic(a: vec3f, v: vec2f) -> f32 {
     return a.x * v.x * v.x + 2.0 * a.y * v.x * v.y + a.z * v.y * v.y;
 }
@@ -47,6 +57,8 @@ struct SymEigen {
 /// Eigenvalues and axis of a positive semi-definite matrix, both at least zero. The axis has x ≥ 0 (and y = +1
 /// where x = 0) and is (1, 0) when both eigenvalues are equal. The smaller is `det / larger`, which keeps its digits
 /// where the textbook's half difference cancels.
+///
+/// Cost on GCN: 33 instructions (5 at a quarter of the rate).
 fn sym2_eigen(a: vec3f) -> SymEigen {
     let half_difference = 0.5 * (a.x - a.z);
     let radius = sqrt(half_difference * half_difference + a.y * a.y);
@@ -67,6 +79,8 @@ fn sym2_eigen(a: vec3f) -> SymEigen {
 
 /// The same eigenvectors with both eigenvalues clamped to `[lo, hi]`, `lo` ≥ 0. A matrix within the range comes back
 /// as it is.
+///
+/// Cost on GCN: 54 instructions (5 at a quarter of the rate).
 fn sym2_clamp_eigen(a: vec3f, lo: f32, hi: f32) -> vec3f {
     let e = sym2_eigen(a);
     let clamped = sym2_from_eigen(clamp(e.larger, lo, hi), clamp(e.smaller, lo, hi), e.axis);
@@ -75,6 +89,8 @@ fn sym2_clamp_eigen(a: vec3f, lo: f32, hi: f32) -> vec3f {
 
 /// The positive semi-definite square root of a positive semi-definite matrix:
 /// `(A + sqrt(det) I) / sqrt(trace + 2 sqrt(det))`, by Cayley–Hamilton.
+///
+/// Cost on GCN: 17 instructions (3 at a quarter of the rate).
 fn sym2_sqrt(a: vec3f) -> vec3f {
     let root_det = sqrt(max(sym2_det(a), 0.0));
     let scale = sqrt(sym2_trace(a) + 2.0 * root_det);
@@ -85,21 +101,29 @@ fn sym2_sqrt(a: vec3f) -> vec3f {
 }
 
 /// `v^T A v`.
+///
+/// Cost on GCN: 12 instructions.
 fn sym3_quadratic(a: mat3x3f, v: vec3f) -> f32 {
     return dot(v, a * v);
 }
 
 /// Trace of a 3×3 matrix.
+///
+/// Cost on GCN: 2 instructions.
 fn sym3_trace(a: mat3x3f) -> f32 {
     return a[0].x + a[1].y + a[2].z;
 }
 
 /// The adjugate of a symmetric matrix: `A adj(A) = det(A) I`. Its columns are the cross products of A's.
+///
+/// Cost on GCN: 18 instructions.
 fn sym3_adjugate(a: mat3x3f) -> mat3x3f {
     return mat3x3f(cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]));
 }
 
 /// Determinant of a symmetric 3×3 matrix.
+///
+/// Cost on GCN: 9 instructions.
 fn sym3_det(a: mat3x3f) -> f32 {
     return dot(a[0], cross(a[1], a[2]));
 }

@@ -96,7 +96,11 @@ fn to_hlsl(wgsl: &str) -> Result<String, Error> {
         hlsl::Options { restrict_indexing: false, force_loop_bounding: false, ..hlsl::Options::default() };
     let mut text = String::new();
     hlsl::Writer::new(&mut text, &options, &hlsl::PipelineOptions::default()).write(&module, &info, None)?;
-    Ok(text)
+    // Padding is for structs in buffers, of which the library has none.
+    let is_padding = |line: &&str| {
+        line.trim_start().starts_with("int _pad") || line.trim_start().starts_with("int _end_pad")
+    };
+    Ok(text.lines().filter(|line| !is_padding(line)).map(|line| format!("{line}\n")).collect())
 }
 
 fn to_msl(wgsl: &str) -> Result<String, Error> {
@@ -116,12 +120,15 @@ fn name_arrays(module: &mut naga::Module) {
         else {
             continue;
         };
-        let base = match module.types[base].inner {
-            naga::TypeInner::Scalar(_) => "Scalar",
-            naga::TypeInner::Vector { .. } => "Vector",
-            _ => "Other",
+        // Names that end in a digit would be changed.
+        let name = match module.types[base].inner {
+            naga::TypeInner::Scalar(_) => format!("Float{size}Array"),
+            naga::TypeInner::Vector { size: components, .. } => {
+                format!("Float{}x{size}Array", components as u8)
+            }
+            _ => continue,
         };
-        let named = naga::Type { name: Some(format!("{base}Array_{size}_")), ..module.types[handle].clone() };
+        let named = naga::Type { name: Some(name), ..module.types[handle].clone() };
         module.types.replace(handle, named);
     }
 }

@@ -106,10 +106,11 @@ impl Costs {
         let budget: serde_json::Value = serde_json::from_slice(&std::fs::read(path)?)?;
         let functions = budget["functions"].as_object().ok_or("the budget has no functions")?;
         let line = |cost: &serde_json::Value| {
-            format!(
-                "/// Cost: {} instructions, {} cycles a wave on GCN (GFX7).\n",
-                cost["instructions"], cost["cycles"]
-            )
+            let (all, slow) = (&cost["instructions"], &cost["quarter_rate"]);
+            let slow = if slow == 0 { String::new() } else { format!(" ({slow} at a quarter of the rate)") };
+            let instructions = if all == 1 { "instruction" } else { "instructions" };
+            let one_round = if cost["loops"] == true { ", one round of its loop" } else { "" };
+            format!("/// Cost on GCN: {all} {instructions}{slow}{one_round}.\n")
         };
         Ok(Costs(functions.iter().map(|(name, cost)| (name.clone(), line(cost))).collect()))
     }
@@ -273,4 +274,18 @@ fn texts_rs(modules: &[Module]) -> String {
         text += "    ];\n}\n";
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two runs, since a resolver that hashes would give each its own order.
+    #[test]
+    fn committed_translations_are_what_their_sources_say() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        for _ in 0..2 {
+            make(&root).and_then(|files| files.check()).unwrap_or_else(|e| panic!("{e}"));
+        }
+    }
 }

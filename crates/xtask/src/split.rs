@@ -51,10 +51,10 @@ fn declared(text: &str) -> Result<&str, Error> {
 /// number off where that leaves one thing of the name.
 pub(crate) fn unnumber(chunks: &mut [Chunk]) {
     let everywhere: BTreeSet<String> =
-        chunks.iter().flat_map(|c| words(&c.text)).map(str::to_owned).collect();
+        chunks.iter().flat_map(|c| identifiers(&c.text)).map(str::to_owned).collect();
     let globals: BTreeSet<String> = chunks.iter().map(|c| c.name.clone()).collect();
     for chunk in chunks {
-        let here: BTreeSet<String> = words(&chunk.text).map(str::to_owned).collect();
+        let here: BTreeSet<String> = identifiers(&chunk.text).map(str::to_owned).collect();
         let base = |word: &str| {
             let (base, number) = word.rsplit_once('_')?;
             (!number.is_empty() && number.bytes().all(|b| b.is_ascii_digit())).then(|| base.to_owned())
@@ -75,6 +75,14 @@ pub(crate) fn unnumber(chunks: &mut [Chunk]) {
     }
 }
 
+/// The words of a text that name no member.
+fn identifiers(text: &str) -> impl Iterator<Item = &str> {
+    words(text).filter(|word| {
+        let at = word.as_ptr() as usize - text.as_ptr() as usize;
+        !text[..at].ends_with('.')
+    })
+}
+
 fn replace_word(text: &str, from: &str, to: &str) -> String {
     let is_part = |c: char| c.is_alphanumeric() || c == '_';
     let mut replaced = String::new();
@@ -87,4 +95,32 @@ fn replace_word(text: &str, from: &str, to: &str) -> String {
         rest = after;
     }
     replaced + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn declarations_are_found_under_their_names() {
+        let text = "#version 450\n\nstruct Pair {\n    int a;\n};\ntypedef float ret_of[9];\n\
+            const float HALF = max(0.5, 0.25);\nret_of of(\n    Pair p\n) {\n    if (true) {\n    }\n}\n";
+        let names: Vec<_> = split(text).unwrap().into_iter().map(|chunk| chunk.name).collect();
+        assert_eq!(names, ["Pair", "ret_of", "HALF", "of"]);
+    }
+
+    #[test]
+    fn a_number_is_kept_where_the_name_without_it_means_something_else() {
+        let unnumbered = |texts: [&str; 2]| {
+            let chunk = |text: &str| Chunk { name: text[..1].to_owned(), text: text.to_owned() };
+            let mut chunks = texts.map(chunk);
+            unnumber(&mut chunks);
+            chunks.map(|chunk| chunk.text)
+        };
+        assert_eq!(unnumbered(["f(x, v.x)", "g(x_1, v_2.x)"]), ["f(x, v.x)", "g(x, v.x)"]);
+        // Two of the name in one function, a function of the name, a word of the language.
+        assert_eq!(unnumbered(["f(x)", "g(x_1, x_2)"])[1], "g(x_1, x_2)");
+        assert_eq!(unnumbered(["f(x)", "g(f_1, f)"])[1], "g(f_1, f)");
+        assert_eq!(unnumbered(["f(half_)", "g(half_1, half)"])[1], "g(half_1, half)");
+    }
 }
