@@ -44,8 +44,8 @@ float alpha_from_gloss(float gloss) {
 ///
 /// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 vec3 aniso_encode(vec3 s) {
-    float product = (s.x * s.z);
-    float rho = ((product > 0.0) ? clamp((s.y * inversesqrt(product)), -1.0, 1.0) : 0.0);
+    float product = s.x * s.z;
+    float rho = (product > 0.0) ? clamp((s.y * inversesqrt(product)), -1.0, 1.0) : 0.0;
     return vec3(sqrt(clamp(s.x, 0.0, 1.0)), ((0.5 * rho) + 0.5), sqrt(clamp(s.z, 0.0, 1.0)));
 }
 
@@ -69,22 +69,22 @@ vec3 aniso_decode_matrix(vec3 texel) {
 ///
 /// Cost on GCN: 36 instructions (5 at a quarter of the rate).
 AnisoDecoded aniso_decode(vec3 texel, vec3 tangent, vec3 bitangent) {
-    float rho = ((texel.y * 2.0) - 1.0);
-    float product = (texel.x * texel.z);
-    float sxy = (product * rho);
-    float sxx = ((texel.x * texel.x) + 1e-12);
-    float syy = (texel.z * texel.z);
-    float half_difference = (0.5 * (sxx - syy));
-    float discr_sqr = (4.0 * ((half_difference * half_difference) + (sxy * sxy)));
+    float rho = (texel.y * 2.0) - 1.0;
+    float product = texel.x * texel.z;
+    float sxy = product * rho;
+    float sxx = (texel.x * texel.x) + 1e-12;
+    float syy = texel.z * texel.z;
+    float half_difference = 0.5 * (sxx - syy);
+    float discr_sqr = 4.0 * ((half_difference * half_difference) + (sxy * sxy));
     float discr_rcp = inversesqrt(discr_sqr);
-    float alpha_t_sqr = (0.5 * ((sxx + syy) + (discr_sqr * discr_rcp)));
+    float alpha_t_sqr = 0.5 * ((sxx + syy) + (discr_sqr * discr_rcp));
     float alpha_t_rcp = inversesqrt(alpha_t_sqr);
-    float alpha_t = (alpha_t_sqr * alpha_t_rcp);
-    float alpha_b = ((product * sqrt((1.0 - (rho * rho)))) * alpha_t_rcp);
+    float alpha_t = alpha_t_sqr * alpha_t_rcp;
+    float alpha_b = (product * sqrt((1.0 - (rho * rho)))) * alpha_t_rcp;
     float c_sqr = clamp(((half_difference * discr_rcp) + 0.5), 0.0, 1.0);
     float c = sqrt(c_sqr);
     float s_abs = sqrt((1.0 - c_sqr));
-    float s = ((sxy < 0.0) ? -(s_abs) : s_abs);
+    float s = (sxy < 0.0) ? -(s_abs) : s_abs;
     return AnisoDecoded(clamp(alpha_t, ALPHA_MIN, 1.0), clamp(alpha_b, ALPHA_MIN, 1.0), ((c * tangent) + (s * bitangent)), ((c * bitangent) - (s * tangent)));
 }
 
@@ -105,7 +105,7 @@ vec2 axis_from_direction(vec2 direction, vec3 n) {
     mat3x3 _e2 = m_n(n);
     vec2 axis = vec2(dot(_e2[0].xy, direction), dot(_e2[1].xy, direction));
     float length_squared = dot(axis, axis);
-    return ((length_squared > 1e-12) ? (axis * inversesqrt(length_squared)) : direction);
+    return (length_squared > 1e-12) ? (axis * inversesqrt(length_squared)) : direction;
 }
 
 /// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
@@ -114,10 +114,10 @@ vec2 axis_from_direction(vec2 direction, vec3 n) {
 /// Cost on GCN: 31 instructions (2 at a quarter of the rate).
 vec2 direction_from_axis(vec2 axis, vec3 n) {
     mat3x3 _e2 = m_n(n);
-    vec3 t = ((_e2[0] * axis.x) + (_e2[1] * axis.y));
-    vec2 d = ((t.xy * n.z) - (t.z * n.xy));
+    vec3 t = (_e2[0] * axis.x) + (_e2[1] * axis.y);
+    vec2 d = (t.xy * n.z) - (t.z * n.xy);
     float length_squared = dot(d, d);
-    return ((length_squared > 1e-12) ? (d * inversesqrt(length_squared)) : axis);
+    return (length_squared > 1e-12) ? (d * inversesqrt(length_squared)) : axis;
 }
 
 /// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
@@ -134,8 +134,8 @@ vec2 alphas_from_khr_anisotropy(float roughness, float strength) {
 ///
 /// Cost on GCN: 8 instructions (3 at a quarter of the rate).
 vec2 khr_anisotropy_from_alphas(float alpha_t, float alpha_b) {
-    float rest = (1.0 - alpha_b);
-    float strength = ((rest > 0.0) ? sqrt(clamp(((alpha_t - alpha_b) / rest), 0.0, 1.0)) : 0.0);
+    float rest = 1.0 - alpha_b;
+    float strength = (rest > 0.0) ? sqrt(clamp(((alpha_t - alpha_b) / rest), 0.0, 1.0)) : 0.0;
     return vec2(sqrt(alpha_b), strength);
 }
 

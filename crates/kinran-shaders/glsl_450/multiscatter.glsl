@@ -15,10 +15,10 @@
 ///
 /// Cost on GCN: 27 instructions (1 at a quarter of the rate).
 float ggx_directional_albedo(float n_v, float alpha) {
-    float m_sqr = (n_v * n_v);
-    float a_sqr = (alpha * alpha);
-    float p = ((((0.00023917 + (0.004272 * alpha)) + (0.014007 * a_sqr)) + (((0.1302 - (0.075028 * alpha)) + (3.2169 * a_sqr)) * n_v)) + (((-0.03449 - (0.18897 * alpha)) + (0.089879 * a_sqr)) * m_sqr));
-    float q = ((((-1.9263e-5 + (0.0054598 * alpha)) + (1.0288 * a_sqr)) + (((0.0019317 - (1.1331 * alpha)) + (5.3123 * a_sqr)) * n_v)) + (((1.0 - (1.3516 * alpha)) - (0.3803 * a_sqr)) * m_sqr));
+    float m_sqr = n_v * n_v;
+    float a_sqr = alpha * alpha;
+    float p = (((0.00023917 + (0.004272 * alpha)) + (0.014007 * a_sqr)) + (((0.1302 - (0.075028 * alpha)) + (3.2169 * a_sqr)) * n_v)) + (((-0.03449 - (0.18897 * alpha)) + (0.089879 * a_sqr)) * m_sqr);
+    float q = (((-1.9263e-5 + (0.0054598 * alpha)) + (1.0288 * a_sqr)) + (((0.0019317 - (1.1331 * alpha)) + (5.3123 * a_sqr)) * n_v)) + (((1.0 - (1.3516 * alpha)) - (0.3803 * a_sqr)) * m_sqr);
     return clamp((1.0 - ((alpha * p) / q)), 0.3, 1.0);
 }
 
@@ -30,7 +30,7 @@ float ggx_directional_albedo(float n_v, float alpha) {
 vec3 multiscatter_compensation(vec3 f0_, float n_v, float alpha_t, float alpha_b) {
     float alpha = sqrt((0.5 * ((alpha_t * alpha_t) + (alpha_b * alpha_b))));
     float _e11 = ggx_directional_albedo(clamp(n_v, 0.0, 1.0), alpha);
-    return (vec3(1.0) + (f0_ * ((1.0 / _e11) - 1.0)));
+    return vec3(1.0) + (f0_ * ((1.0 / _e11) - 1.0));
 }
 
 #endif

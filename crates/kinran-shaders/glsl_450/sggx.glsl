@@ -31,8 +31,8 @@ struct SlopeDistribution {
 /// Cost on GCN: 51 instructions (1 at a quarter of the rate).
 mat3x3 sggx_from_ggx(vec3 n, vec3 a) {
     mat3x3 _e2 = m_n(n);
-    vec3 ax = ((_e2[0] * a.x) + (_e2[1] * a.y));
-    vec3 ay = ((_e2[0] * a.y) + (_e2[1] * a.z));
+    vec3 ax = (_e2[0] * a.x) + (_e2[1] * a.y);
+    vec3 ay = (_e2[0] * a.y) + (_e2[1] * a.z);
     return mat3x3((((ax * _e2[0].x) + (ay * _e2[1].x)) + (n * n.x)), (((ax * _e2[0].y) + (ay * _e2[1].y)) + (n * n.y)), (((ax * _e2[0].z) + (ay * _e2[1].z)) + (n * n.z)));
 }
 
@@ -53,7 +53,7 @@ float sggx_d(mat3x3 s, vec3 h) {
     float _e2 = sym3_det(s);
     mat3x3 _e3 = sym3_adjugate(s);
     float _e4 = sym3_quadratic(_e3, h);
-    return ((_e2 * sqrt(_e2)) / ((3.1415927 * _e4) * _e4));
+    return (_e2 * sqrt(_e2)) / ((3.1415927 * _e4) * _e4);
 }
 
 /// The slope distribution an SGGX matrix with zz > 0 stands for, seen from the z axis: `S / S_zz = [A + m m^T, m;
@@ -61,9 +61,9 @@ float sggx_d(mat3x3 s, vec3 h) {
 ///
 /// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 SlopeDistribution slopes_from_sggx(mat3x3 s) {
-    float inv = (1.0 / s[2].z);
-    vec2 m = (s[2].xy * inv);
-    vec3 a = ((vec3(s[0].x, s[0].y, s[1].y) * inv) - vec3((m.x * m.x), (m.x * m.y), (m.y * m.y)));
+    float inv = 1.0 / s[2].z;
+    vec2 m = s[2].xy * inv;
+    vec3 a = (vec3(s[0].x, s[0].y, s[1].y) * inv) - vec3((m.x * m.x), (m.x * m.y), (m.y * m.y));
     return SlopeDistribution(m, a);
 }
 
@@ -71,7 +71,7 @@ SlopeDistribution slopes_from_sggx(mat3x3 s) {
 ///
 /// Cost on GCN: 3 instructions.
 mat3x3 sggx_from_slopes(vec2 m, vec3 a) {
-    float xy = (a.y + (m.x * m.y));
+    float xy = a.y + (m.x * m.y);
     return mat3x3(vec3((a.x + (m.x * m.x)), xy, m.x), vec3(xy, (a.z + (m.y * m.y)), m.y), vec3(m, 1.0));
 }
 
@@ -84,26 +84,26 @@ vec3 sggx_power_iteration(mat3x3 s, vec3 start, uint steps) {
     vec3 n = vec3(0.0);
     uint i = 0u;
     float _e3 = sym3_trace(s);
-    float scale = (1.0 / max(_e3, 1e-30));
+    float scale = 1.0 / max(_e3, 1e-30);
     n = start;
     bool loop_init = true;
     while(true) {
         if (!loop_init) {
             uint _e24 = i;
-            i = (_e24 + 1u);
+            i = _e24 + 1u;
         }
         loop_init = false;
         uint _e11 = i;
-        if ((_e11 < steps)) {
+        if (_e11 < steps) {
         } else {
             break;
         }
         {
             vec3 _e13 = n;
-            vec3 next = ((s * _e13) * scale);
+            vec3 next = (s * _e13) * scale;
             float length_squared = dot(next, next);
             vec3 _e17 = n;
-            n = ((length_squared > 0.0) ? (next * inversesqrt(length_squared)) : _e17);
+            n = (length_squared > 0.0) ? (next * inversesqrt(length_squared)) : _e17;
         }
     }
     vec3 _e26 = n;
@@ -114,7 +114,7 @@ vec3 sggx_power_iteration(mat3x3 s, vec3 start, uint steps) {
 ///
 /// Cost on GCN: 7 instructions (1 at a quarter of the rate).
 float sggx_overlap(float l, float moment, float moment_sqr) {
-    return ((((moment_sqr + (l * moment)) + (l * l)) - 3.0) / (((3.0 * l) * l) - 3.0));
+    return (((moment_sqr + (l * moment)) + (l * l)) - 3.0) / (((3.0 * l) * l) - 3.0);
 }
 
 /// The unit eigenvector of `s` with the largest overlap with the unit vector `start`, signed to agree with it.
@@ -128,40 +128,40 @@ vec3 sggx_principal_axis(mat3x3 s, vec3 start) {
     bool local_3 = false;
     mat3x3 identity = mat3x3(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0));
     float _e17 = sym3_trace(s);
-    mat3x3 deviator = ((s * (1.0 / _e17)) - (identity * 0.33333334));
-    float squares = ((dot(deviator[0], deviator[0]) + dot(deviator[1], deviator[1])) + dot(deviator[2], deviator[2]));
+    mat3x3 deviator = (s * (1.0 / _e17)) - (identity * 0.33333334);
+    float squares = (dot(deviator[0], deviator[0]) + dot(deviator[1], deviator[1])) + dot(deviator[2], deviator[2]);
     float size = sqrt((squares * 0.16666667));
-    mat3x3 unit = (deviator * (1.0 / size));
+    mat3x3 unit = deviator * (1.0 / size);
     float _e41 = sym3_det(unit);
-    float r = (0.5 * _e41);
-    mat3x3 b = (unit * ((r < 0.0) ? -1.0 : 1.0));
+    float r = 0.5 * _e41;
+    mat3x3 b = unit * ((r < 0.0) ? -1.0 : 1.0);
     float t_sqr = max((0.5 - (0.5 * abs(r))), 0.0);
-    float series = (1.0 + (t_sqr * (0.09259259 + (t_sqr * (0.039609052 + (t_sqr * 0.023157675))))));
-    float sine = ((sqrt(t_sqr) * 0.6666667) * series);
+    float series = 1.0 + (t_sqr * (0.09259259 + (t_sqr * (0.039609052 + (t_sqr * 0.023157675)))));
+    float sine = (sqrt(t_sqr) * 0.6666667) * series;
     float cosine = sqrt((1.0 - (sine * sine)));
-    float l_first = (2.0 * cosine);
-    float l_second = ((1.7320508 * sine) - cosine);
-    float l_third = ((-(1.7320508) * sine) - cosine);
-    vec3 bn = (b * start);
+    float l_first = 2.0 * cosine;
+    float l_second = (1.7320508 * sine) - cosine;
+    float l_third = (-(1.7320508) * sine) - cosine;
+    vec3 bn = b * start;
     float moment = dot(start, bn);
     float moment_sqr = dot(bn, bn);
     float _e85 = sggx_overlap(l_first, moment, moment_sqr);
     float w_first = clamp(_e85, 0.0, 1.0);
-    bool coincident = (sine < 0.001);
-    float rest = (1.0 - w_first);
+    bool coincident = sine < 0.001;
+    float rest = 1.0 - w_first;
     float _e90 = sggx_overlap(l_second, moment, moment_sqr);
-    float w_second = (coincident ? rest : min(max(_e90, 0.0), rest));
-    float w_third = ((1.0 - w_first) - w_second);
-    bool is_first = (w_first >= max(w_second, w_third));
-    vec3 p = (bn - (start * (is_first ? l_second : l_first)));
+    float w_second = coincident ? rest : min(max(_e90, 0.0), rest);
+    float w_third = (1.0 - w_first) - w_second;
+    bool is_first = w_first >= max(w_second, w_third);
+    vec3 p = bn - (start * (is_first ? l_second : l_first));
     if (!(is_first)) {
-        local_2 = (w_second >= w_third);
+        local_2 = w_second >= w_third;
     } else {
         local_2 = true;
     }
     bool _e108 = local_2;
-    float other = (_e108 ? l_third : l_second);
-    vec3 q = ((b * p) - (p * other));
+    float other = _e108 ? l_third : l_second;
+    vec3 q = (b * p) - (p * other);
     if (coincident) {
         local_3 = !(is_first);
     } else {
@@ -171,12 +171,12 @@ vec3 sggx_principal_axis(mat3x3 s, vec3 start) {
     vec3 projected = normalize((_e117 ? p : q));
     float _e120 = sym3_quadratic(b, projected);
     mat3x3 _e123 = sym3_adjugate((b - (identity * _e120)));
-    vec3 refined = (_e123 * projected);
+    vec3 refined = _e123 * projected;
     float refined_length = length(refined);
-    bool far = (refined_length > ((6.0 * 1.7320508) * 0.001));
-    vec3 axis = (far ? (refined * (1.0 / refined_length)) : projected);
-    vec3 n = ((size > 3e-6) ? axis : start);
-    return ((dot(n, start) < 0.0) ? -(n) : n);
+    bool far = refined_length > ((6.0 * 1.7320508) * 0.001);
+    vec3 axis = far ? (refined * (1.0 / refined_length)) : projected;
+    vec3 n = (size > 3e-6) ? axis : start;
+    return (dot(n, start) < 0.0) ? -(n) : n;
 }
 
 /// `ggx_from_sggx` before the clamp of the roughness.
@@ -184,12 +184,12 @@ vec3 sggx_principal_axis(mat3x3 s, vec3 start) {
 /// Cost on GCN: 268 instructions (12 at a quarter of the rate).
 GgxSurface ggx_from_sggx_unclamped(mat3x3 s, vec3 mean_normal) {
     vec3 _e2 = sggx_principal_axis(s, mean_normal);
-    vec3 n = ((_e2.z < 0.0) ? -(_e2) : _e2);
+    vec3 n = (_e2.z < 0.0) ? -(_e2) : _e2;
     mat3x3 _e8 = m_n(n);
-    vec3 sx = (s * _e8[0]);
-    vec3 sy = (s * _e8[1]);
+    vec3 sx = s * _e8[0];
+    vec3 sy = s * _e8[1];
     float _e13 = sym3_quadratic(s, n);
-    float inv = (1.0 / max(_e13, 1e-30));
+    float inv = 1.0 / max(_e13, 1e-30);
     return GgxSurface(n, (vec3(dot(_e8[0], sx), dot(_e8[0], sy), dot(_e8[1], sy)) * inv));
 }
 

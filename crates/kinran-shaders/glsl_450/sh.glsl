@@ -27,7 +27,7 @@ float[9] sh_basis(vec3 direction) {
 /// Cost on GCN: 41 instructions.
 vec3 sh_evaluate(vec3 coefficients[9], vec3 direction) {
     float _e2[9] = sh_basis(direction);
-    return (((((((((coefficients[0] * _e2[0]) + (coefficients[1] * _e2[1])) + (coefficients[2] * _e2[2])) + (coefficients[3] * _e2[3])) + (coefficients[4] * _e2[4])) + (coefficients[5] * _e2[5])) + (coefficients[6] * _e2[6])) + (coefficients[7] * _e2[7])) + (coefficients[8] * _e2[8]));
+    return ((((((((coefficients[0] * _e2[0]) + (coefficients[1] * _e2[1])) + (coefficients[2] * _e2[2])) + (coefficients[3] * _e2[3])) + (coefficients[4] * _e2[4])) + (coefficients[5] * _e2[5])) + (coefficients[6] * _e2[6])) + (coefficients[7] * _e2[7])) + (coefficients[8] * _e2[8]);
 }
 
 /// Coefficients of irradiance from those of radiance (eq. 7), once per environment; `sh_evaluate` of the result is

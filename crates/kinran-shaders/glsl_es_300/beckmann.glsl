@@ -15,14 +15,14 @@
 ///
 /// Cost on GCN: 1 instruction.
 float sigma_from_alpha(float alpha) {
-    return (alpha * 0.70710677);
+    return alpha * 0.70710677;
 }
 
 /// The inverse of `sigma_from_alpha`.
 ///
 /// Cost on GCN: 1 instruction.
 float alpha_from_sigma(float sigma) {
-    return (sigma * 1.4142135);
+    return sigma * 1.4142135;
 }
 
 /// Distribution of microfacet normals per steradian with slope deviations `sigma_t`, `sigma_b` along x and y
@@ -30,27 +30,27 @@ float alpha_from_sigma(float sigma) {
 ///
 /// Cost on GCN: 20 instructions (5 at a quarter of the rate).
 float beckmann_aniso_d(vec3 h, float sigma_t, float sigma_b) {
-    if ((h.z <= 1e-6)) {
+    if (h.z <= 1e-6) {
         return 0.0;
     }
-    float z_sqr = (h.z * h.z);
-    float x = (h.x / sigma_t);
-    float y = (h.y / sigma_b);
-    return (exp(((-0.5 * ((x * x) + (y * y))) / z_sqr)) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr));
+    float z_sqr = h.z * h.z;
+    float x = h.x / sigma_t;
+    float y = h.y / sigma_b;
+    return exp(((-0.5 * ((x * x) + (y * y))) / z_sqr)) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr);
 }
 
 /// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
 ///
 /// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 vec2 slope_from_normal(vec3 n) {
-    return (n.xy / vec2(n.z));
+    return n.xy / vec2(n.z);
 }
 
 /// Unit normal of a slope.
 ///
 /// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 vec3 normal_from_slope(vec2 slope) {
-    return (vec3(slope, 1.0) * inversesqrt((1.0 + dot(slope, slope))));
+    return vec3(slope, 1.0) * inversesqrt((1.0 + dot(slope, slope)));
 }
 
 #endif

@@ -15,12 +15,12 @@
 ///
 /// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 mat3x3 m_n(vec3 n) {
-    float d = (1.0 + n.z);
-    if ((d < 1e-6)) {
+    float d = 1.0 + n.z;
+    if (d < 1e-6) {
         return mat3x3(vec3(1.0, 0.0, 0.0), vec3(0.0, -1.0, 0.0), vec3(0.0, 0.0, -1.0));
     }
-    float a = (1.0 / d);
-    float xy = ((-(n.x) * n.y) * a);
+    float a = 1.0 / d;
+    float xy = (-(n.x) * n.y) * a;
     return mat3x3(vec3((n.z + ((n.y * n.y) * a)), xy, -(n.x)), vec3(xy, (n.z + ((n.x * n.x) * a)), -(n.y)), n);
 }
 
@@ -29,7 +29,7 @@ mat3x3 m_n(vec3 n) {
 ///
 /// Cost on GCN: 8 instructions (2 at a quarter of the rate).
 vec3 normal_from_xy(float x, float y) {
-    float xy_squared = ((x * x) + (y * y));
+    float xy_squared = (x * x) + (y * y);
     float scale = inversesqrt(max(xy_squared, 1.0));
     return vec3((x * scale), (y * scale), sqrt(max((1.0 - xy_squared), 0.0)));
 }

@@ -33,21 +33,21 @@ vec3 sym2_outer(vec2 v) {
 ///
 /// Cost on GCN: 2 instructions.
 float sym2_det(vec3 a) {
-    return ((a.x * a.z) - (a.y * a.y));
+    return (a.x * a.z) - (a.y * a.y);
 }
 
 /// Trace of a 2×2 matrix.
 ///
 /// Cost on GCN: 1 instruction.
 float sym2_trace(vec3 a) {
-    return (a.x + a.z);
+    return a.x + a.z;
 }
 
 /// `v^T A v`.
 ///
 /// Cost on GCN: 7 instructions.
 float sym2_quadratic(vec3 a, vec2 v) {
-    return ((((a.x * v.x) * v.x) + (((2.0 * a.y) * v.x) * v.y)) + ((a.z * v.y) * v.y));
+    return (((a.x * v.x) * v.x) + (((2.0 * a.y) * v.x) * v.y)) + ((a.z * v.y) * v.y);
 }
 
 /// Eigenvalues and axis of a positive semi-definite matrix, both at least zero. The axis has x ≥ 0 (and y = +1
@@ -57,11 +57,11 @@ float sym2_quadratic(vec3 a, vec2 v) {
 /// Cost on GCN: 33 instructions (5 at a quarter of the rate).
 SymEigen sym2_eigen(vec3 a) {
     bool local = false;
-    float half_difference = (0.5 * (a.x - a.z));
+    float half_difference = 0.5 * (a.x - a.z);
     float radius = sqrt(((half_difference * half_difference) + (a.y * a.y)));
-    float larger = ((0.5 * (a.x + a.z)) + radius);
+    float larger = (0.5 * (a.x + a.z)) + radius;
     if (!((radius <= (1e-12 * larger)))) {
-        local = (larger <= 0.0);
+        local = larger <= 0.0;
     } else {
         local = true;
     }
@@ -72,9 +72,9 @@ SymEigen sym2_eigen(vec3 a) {
     float _e39 = sym2_det(a);
     float smaller = min(max((_e39 / larger), 0.0), larger);
     float long_ = sqrt((0.5 + ((0.5 * abs(half_difference)) / radius)));
-    float short_ = ((0.5 * abs(a.y)) / (radius * long_));
-    float side = ((a.y < 0.0) ? -1.0 : 1.0);
-    vec2 axis = ((half_difference >= 0.0) ? vec2(long_, (side * short_)) : vec2(short_, (side * long_)));
+    float short_ = (0.5 * abs(a.y)) / (radius * long_);
+    float side = (a.y < 0.0) ? -1.0 : 1.0;
+    vec2 axis = (half_difference >= 0.0) ? vec2(long_, (side * short_)) : vec2(short_, (side * long_));
     return SymEigen(larger, smaller, axis);
 }
 
@@ -86,13 +86,13 @@ vec3 sym2_clamp_eigen(vec3 a, float lo, float hi) {
     bool local = false;
     SymEigen _e3 = sym2_eigen(a);
     vec3 _e9 = sym2_from_eigen(clamp(_e3.larger, lo, hi), clamp(_e3.smaller, lo, hi), _e3.axis);
-    if ((_e3.larger <= hi)) {
-        local = (_e3.smaller > lo);
+    if (_e3.larger <= hi) {
+        local = _e3.smaller > lo;
     } else {
         local = false;
     }
     bool _e17 = local;
-    return (_e17 ? a : _e9);
+    return _e17 ? a : _e9;
 }
 
 /// The positive semi-definite square root of a positive semi-definite matrix:
@@ -104,10 +104,10 @@ vec3 sym2_sqrt(vec3 a) {
     float root_det = sqrt(max(_e1, 0.0));
     float _e5 = sym2_trace(a);
     float scale = sqrt((_e5 + (2.0 * root_det)));
-    if ((scale == 0.0)) {
+    if (scale == 0.0) {
         return vec3(0.0);
     }
-    return ((a + vec3(root_det, 0.0, root_det)) * (1.0 / scale));
+    return (a + vec3(root_det, 0.0, root_det)) * (1.0 / scale);
 }
 
 /// `v^T A v`.
@@ -121,7 +121,7 @@ float sym3_quadratic(mat3x3 a, vec3 v) {
 ///
 /// Cost on GCN: 2 instructions.
 float sym3_trace(mat3x3 a) {
-    return ((a[0].x + a[1].y) + a[2].z);
+    return (a[0].x + a[1].y) + a[2].z;
 }
 
 /// The adjugate of a symmetric matrix: `A adj(A) = det(A) I`. Its columns are the cross products of A's.

@@ -47,8 +47,8 @@ float alpha_from_gloss(float gloss)
 /// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 float3 aniso_encode(float3 s)
 {
-    float product = (s.x * s.z);
-    float rho = ((product > 0.0) ? clamp((s.y * rsqrt(product)), -1.0, 1.0) : 0.0);
+    float product = s.x * s.z;
+    float rho = (product > 0.0) ? clamp((s.y * rsqrt(product)), -1.0, 1.0) : 0.0;
     return float3(sqrt(saturate(s.x)), ((0.5 * rho) + 0.5), sqrt(saturate(s.z)));
 }
 
@@ -86,22 +86,22 @@ AnisoDecoded ConstructAnisoDecoded(float arg0, float arg1, float3 arg2, float3 a
 /// Cost on GCN: 36 instructions (5 at a quarter of the rate).
 AnisoDecoded aniso_decode(float3 texel, float3 tangent, float3 bitangent)
 {
-    float rho = ((texel.y * 2.0) - 1.0);
-    float product = (texel.x * texel.z);
-    float sxy = (product * rho);
-    float sxx = ((texel.x * texel.x) + 1e-12);
-    float syy = (texel.z * texel.z);
-    float half_difference = (0.5 * (sxx - syy));
-    float discr_sqr = (4.0 * ((half_difference * half_difference) + (sxy * sxy)));
+    float rho = (texel.y * 2.0) - 1.0;
+    float product = texel.x * texel.z;
+    float sxy = product * rho;
+    float sxx = (texel.x * texel.x) + 1e-12;
+    float syy = texel.z * texel.z;
+    float half_difference = 0.5 * (sxx - syy);
+    float discr_sqr = 4.0 * ((half_difference * half_difference) + (sxy * sxy));
     float discr_rcp = rsqrt(discr_sqr);
-    float alpha_t_sqr = (0.5 * ((sxx + syy) + (discr_sqr * discr_rcp)));
+    float alpha_t_sqr = 0.5 * ((sxx + syy) + (discr_sqr * discr_rcp));
     float alpha_t_rcp = rsqrt(alpha_t_sqr);
-    float alpha_t = (alpha_t_sqr * alpha_t_rcp);
-    float alpha_b = ((product * sqrt((1.0 - (rho * rho)))) * alpha_t_rcp);
+    float alpha_t = alpha_t_sqr * alpha_t_rcp;
+    float alpha_b = (product * sqrt((1.0 - (rho * rho)))) * alpha_t_rcp;
     float c_sqr = saturate(((half_difference * discr_rcp) + 0.5));
     float c = sqrt(c_sqr);
     float s_abs = sqrt((1.0 - c_sqr));
-    float s = ((sxy < 0.0) ? -(s_abs) : s_abs);
+    float s = (sxy < 0.0) ? -(s_abs) : s_abs;
     const AnisoDecoded anisodecoded = ConstructAnisoDecoded(clamp(alpha_t, ALPHA_MIN, 1.0), clamp(alpha_b, ALPHA_MIN, 1.0), ((c * tangent) + (s * bitangent)), ((c * bitangent) - (s * tangent)));
     return anisodecoded;
 }
@@ -125,7 +125,7 @@ float2 axis_from_direction(float2 direction, float3 n)
     const float3x3 _e2 = m_n(n);
     float2 axis = float2(dot(_e2[0].xy, direction), dot(_e2[1].xy, direction));
     float length_squared = dot(axis, axis);
-    return ((length_squared > 1e-12) ? (axis * rsqrt(length_squared)) : direction);
+    return (length_squared > 1e-12) ? (axis * rsqrt(length_squared)) : direction;
 }
 
 /// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
@@ -135,10 +135,10 @@ float2 axis_from_direction(float2 direction, float3 n)
 float2 direction_from_axis(float2 axis, float3 n)
 {
     const float3x3 _e2 = m_n(n);
-    float3 t = ((_e2[0] * axis.x) + (_e2[1] * axis.y));
-    float2 d = ((t.xy * n.z) - (t.z * n.xy));
+    float3 t = (_e2[0] * axis.x) + (_e2[1] * axis.y);
+    float2 d = (t.xy * n.z) - (t.z * n.xy);
     float length_squared = dot(d, d);
-    return ((length_squared > 1e-12) ? (d * rsqrt(length_squared)) : axis);
+    return (length_squared > 1e-12) ? (d * rsqrt(length_squared)) : axis;
 }
 
 /// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
@@ -157,8 +157,8 @@ float2 alphas_from_khr_anisotropy(float roughness, float strength)
 /// Cost on GCN: 8 instructions (3 at a quarter of the rate).
 float2 khr_anisotropy_from_alphas(float alpha_t, float alpha_b)
 {
-    float rest = (1.0 - alpha_b);
-    float strength = ((rest > 0.0) ? sqrt(saturate(((alpha_t - alpha_b) / rest))) : 0.0);
+    float rest = 1.0 - alpha_b;
+    float strength = (rest > 0.0) ? sqrt(saturate(((alpha_t - alpha_b) / rest))) : 0.0;
     return float2(sqrt(alpha_b), strength);
 }
 

@@ -16,12 +16,12 @@
 /// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 float3x3 m_n(float3 n)
 {
-    float d = (1.0 + n.z);
-    if ((d < 1e-6)) {
+    float d = 1.0 + n.z;
+    if (d < 1e-6) {
         return float3x3(float3(1.0, 0.0, 0.0), float3(0.0, -1.0, 0.0), float3(0.0, 0.0, -1.0));
     }
-    float a = (1.0 / d);
-    float xy = ((-(n.x) * n.y) * a);
+    float a = 1.0 / d;
+    float xy = (-(n.x) * n.y) * a;
     return float3x3(float3((n.z + ((n.y * n.y) * a)), xy, -(n.x)), float3(xy, (n.z + ((n.x * n.x) * a)), -(n.y)), n);
 }
 
@@ -31,7 +31,7 @@ float3x3 m_n(float3 n)
 /// Cost on GCN: 8 instructions (2 at a quarter of the rate).
 float3 normal_from_xy(float x, float y)
 {
-    float xy_squared = ((x * x) + (y * y));
+    float xy_squared = (x * x) + (y * y);
     float scale = rsqrt(max(xy_squared, 1.0));
     return float3((x * scale), (y * scale), sqrt(max((1.0 - xy_squared), 0.0)));
 }

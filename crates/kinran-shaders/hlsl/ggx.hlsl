@@ -28,9 +28,9 @@ static const float FRAC_1_PI = 0.31830987;
 /// Cost on GCN: 10 instructions (1 at a quarter of the rate).
 float ggx_d(float n_h, float alpha)
 {
-    float a_sqr = (alpha * alpha);
-    float q = (((1.0 - n_h) * (1.0 + n_h)) + ((a_sqr * n_h) * n_h));
-    return ((a_sqr * FRAC_1_PI) / (q * q));
+    float a_sqr = alpha * alpha;
+    float q = ((1.0 - n_h) * (1.0 + n_h)) + ((a_sqr * n_h) * n_h);
+    return (a_sqr * FRAC_1_PI) / (q * q);
 }
 
 /// Anisotropic distribution of microfacet normals per steradian (slide: Our Algorithm, the form with
@@ -39,10 +39,10 @@ float ggx_d(float n_h, float alpha)
 /// Cost on GCN: 12 instructions (1 at a quarter of the rate).
 float ggx_aniso_d(float3 h, float alpha_t, float alpha_b)
 {
-    float alpha_tb = (alpha_t * alpha_b);
+    float alpha_tb = alpha_t * alpha_b;
     float3 v = float3((h.x * alpha_b), (h.y * alpha_t), (h.z * alpha_tb));
-    float w = (alpha_tb / dot(v, v));
-    return (((alpha_tb * FRAC_1_PI) * w) * w);
+    float w = alpha_tb / dot(v, v);
+    return ((alpha_tb * FRAC_1_PI) * w) * w;
 }
 
 /// `ggx_aniso_d` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode:
@@ -53,8 +53,8 @@ float ggx_matrix_d(float3 h, float3 a)
 {
     const float _e2 = sym2_det(a);
     const float _e9 = sym2_quadratic(float3(a.z, -(a.y), a.x), h.xy);
-    float w = (_e2 / (_e9 + ((_e2 * h.z) * h.z)));
-    return (((rsqrt(_e2) * FRAC_1_PI) * w) * w);
+    float w = _e2 / (_e9 + ((_e2 * h.z) * h.z));
+    return ((rsqrt(_e2) * FRAC_1_PI) * w) * w;
 }
 
 /// Visibility from the two terms of `2 n·u n·v (1 + Λ(u) + Λ(v))`: `n·v |u'|` and `n·u |v'|`, where the prime
@@ -63,7 +63,7 @@ float ggx_matrix_d(float3 h, float3 a)
 /// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 float smith_v_of_terms(float u, float v)
 {
-    return (0.5 / max((u + v), MIN_POSITIVE));
+    return 0.5 / max((u + v), MIN_POSITIVE);
 }
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, isotropic (Heitz 2014, eq. 99).
@@ -71,9 +71,9 @@ float smith_v_of_terms(float u, float v)
 /// Cost on GCN: 12 instructions (3 at a quarter of the rate).
 float smith_v(float n_u, float n_v, float alpha)
 {
-    float a_sqr = (alpha * alpha);
-    float v = (n_u * sqrt((((n_v * n_v) * (1.0 - a_sqr)) + a_sqr)));
-    float u = (n_v * sqrt((((n_u * n_u) * (1.0 - a_sqr)) + a_sqr)));
+    float a_sqr = alpha * alpha;
+    float v = n_u * sqrt((((n_v * n_v) * (1.0 - a_sqr)) + a_sqr));
+    float u = n_v * sqrt((((n_u * n_u) * (1.0 - a_sqr)) + a_sqr));
     const float _e18 = smith_v_of_terms(u, v);
     return _e18;
 }
@@ -107,7 +107,7 @@ float smith_matrix_v(float3 u, float3 v, float3 a)
 /// Cost on GCN: 10 instructions (2 at a quarter of the rate).
 float smith_aniso_g1(float3 v, float alpha_t, float alpha_b)
 {
-    return ((2.0 * v.z) / (v.z + length((v * float3(alpha_t, alpha_b, 1.0)))));
+    return (2.0 * v.z) / (v.z + length((v * float3(alpha_t, alpha_b, 1.0))));
 }
 
 /// Fresnel reflectance by Schlick's approximation (1994) from `f0` at normal incidence to one at grazing.
@@ -116,8 +116,8 @@ float smith_aniso_g1(float3 v, float alpha_t, float alpha_b)
 float3 schlick_f(float3 f0_1, float v_h)
 {
     float m = saturate((1.0 - v_h));
-    float m_sqr = (m * m);
-    return (f0_1 + (((1.0).xxx - f0_1) * ((m_sqr * m_sqr) * m)));
+    float m_sqr = m * m;
+    return f0_1 + (((1.0).xxx - f0_1) * ((m_sqr * m_sqr) * m));
 }
 
 /// A microfacet normal distributed as `ggx_vndf_pdf` for the view direction `v`, from two uniform numbers in [0, 1)
@@ -128,13 +128,13 @@ float3 ggx_vndf_sample(float3 v, float alpha_t, float alpha_b, float2 xi)
 {
     float3 stretch = float3(alpha_t, alpha_b, 1.0);
     float3 v_std = normalize((v * stretch));
-    float phi = (6.2831855 * xi.x);
-    float z = (((1.0 - xi.y) * (1.0 + v_std.z)) - v_std.z);
+    float phi = 6.2831855 * xi.x;
+    float z = ((1.0 - xi.y) * (1.0 + v_std.z)) - v_std.z;
     float sin_theta = sqrt(max((1.0 - (z * z)), 0.0));
     float3 cap = float3((sin_theta * cos(phi)), (sin_theta * sin(phi)), z);
-    float3 h = ((cap + v_std) * stretch);
+    float3 h = (cap + v_std) * stretch;
     float length_squared = dot(h, h);
-    return ((length_squared > 0.0) ? (h * rsqrt(length_squared)) : float3(0.0, 0.0, 1.0));
+    return (length_squared > 0.0) ? (h * rsqrt(length_squared)) : float3(0.0, 0.0, 1.0);
 }
 
 /// Density per steradian of microfacet normals visible from `v`: `G1(v) max(v·h, 0) D(h) / n·v` (Heitz 2014, eq. 16).
@@ -143,12 +143,12 @@ float3 ggx_vndf_sample(float3 v, float alpha_t, float alpha_b, float2 xi)
 /// Cost on GCN: 29 instructions (3 at a quarter of the rate).
 float ggx_vndf_pdf(float3 v, float3 h, float alpha_t, float alpha_b)
 {
-    if ((h.z <= 0.0)) {
+    if (h.z <= 0.0) {
         return 0.0;
     }
-    float g_over_n_v = (2.0 / (v.z + length((v * float3(alpha_t, alpha_b, 1.0)))));
+    float g_over_n_v = 2.0 / (v.z + length((v * float3(alpha_t, alpha_b, 1.0))));
     const float _e20 = ggx_aniso_d(h, alpha_t, alpha_b);
-    return ((g_over_n_v * max(dot(v, h), 0.0)) * _e20);
+    return (g_over_n_v * max(dot(v, h), 0.0)) * _e20;
 }
 
 #endif

@@ -16,7 +16,7 @@
 /// Cost on GCN: 1 instruction.
 float sigma_from_alpha(float alpha)
 {
-    return (alpha * 0.70710677);
+    return alpha * 0.70710677;
 }
 
 /// The inverse of `sigma_from_alpha`.
@@ -24,7 +24,7 @@ float sigma_from_alpha(float alpha)
 /// Cost on GCN: 1 instruction.
 float alpha_from_sigma(float sigma)
 {
-    return (sigma * 1.4142135);
+    return sigma * 1.4142135;
 }
 
 /// Distribution of microfacet normals per steradian with slope deviations `sigma_t`, `sigma_b` along x and y
@@ -33,13 +33,13 @@ float alpha_from_sigma(float sigma)
 /// Cost on GCN: 20 instructions (5 at a quarter of the rate).
 float beckmann_aniso_d(float3 h, float sigma_t, float sigma_b)
 {
-    if ((h.z <= 1e-6)) {
+    if (h.z <= 1e-6) {
         return 0.0;
     }
-    float z_sqr = (h.z * h.z);
-    float x = (h.x / sigma_t);
-    float y = (h.y / sigma_b);
-    return (exp(((-0.5 * ((x * x) + (y * y))) / z_sqr)) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr));
+    float z_sqr = h.z * h.z;
+    float x = h.x / sigma_t;
+    float y = h.y / sigma_b;
+    return exp(((-0.5 * ((x * x) + (y * y))) / z_sqr)) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr);
 }
 
 /// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
@@ -47,7 +47,7 @@ float beckmann_aniso_d(float3 h, float sigma_t, float sigma_b)
 /// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 float2 slope_from_normal(float3 n)
 {
-    return (n.xy / (n.z).xx);
+    return n.xy / (n.z).xx;
 }
 
 /// Unit normal of a slope.
@@ -55,7 +55,7 @@ float2 slope_from_normal(float3 n)
 /// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 float3 normal_from_slope(float2 slope)
 {
-    return (float3(slope, 1.0) * rsqrt((1.0 + dot(slope, slope))));
+    return float3(slope, 1.0) * rsqrt((1.0 + dot(slope, slope)));
 }
 
 #endif
@@ -78,12 +78,12 @@ float3 normal_from_slope(float2 slope)
 /// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 float3x3 m_n(float3 n)
 {
-    float d = (1.0 + n.z);
-    if ((d < 1e-6)) {
+    float d = 1.0 + n.z;
+    if (d < 1e-6) {
         return float3x3(float3(1.0, 0.0, 0.0), float3(0.0, -1.0, 0.0), float3(0.0, 0.0, -1.0));
     }
-    float a = (1.0 / d);
-    float xy = ((-(n.x) * n.y) * a);
+    float a = 1.0 / d;
+    float xy = (-(n.x) * n.y) * a;
     return float3x3(float3((n.z + ((n.y * n.y) * a)), xy, -(n.x)), float3(xy, (n.z + ((n.x * n.x) * a)), -(n.y)), n);
 }
 
@@ -93,7 +93,7 @@ float3x3 m_n(float3 n)
 /// Cost on GCN: 8 instructions (2 at a quarter of the rate).
 float3 normal_from_xy(float x, float y)
 {
-    float xy_squared = ((x * x) + (y * y));
+    float xy_squared = (x * x) + (y * y);
     float scale = rsqrt(max(xy_squared, 1.0));
     return float3((x * scale), (y * scale), sqrt(max((1.0 - xy_squared), 0.0)));
 }
@@ -118,10 +118,10 @@ float3 normal_from_xy(float x, float y)
 /// Cost on GCN: 27 instructions (1 at a quarter of the rate).
 float ggx_directional_albedo(float n_v, float alpha)
 {
-    float m_sqr = (n_v * n_v);
-    float a_sqr = (alpha * alpha);
-    float p = ((((0.00023917 + (0.004272 * alpha)) + (0.014007 * a_sqr)) + (((0.1302 - (0.075028 * alpha)) + (3.2169 * a_sqr)) * n_v)) + (((-0.03449 - (0.18897 * alpha)) + (0.089879 * a_sqr)) * m_sqr));
-    float q = ((((-1.9263e-5 + (0.0054598 * alpha)) + (1.0288 * a_sqr)) + (((0.0019317 - (1.1331 * alpha)) + (5.3123 * a_sqr)) * n_v)) + (((1.0 - (1.3516 * alpha)) - (0.3803 * a_sqr)) * m_sqr));
+    float m_sqr = n_v * n_v;
+    float a_sqr = alpha * alpha;
+    float p = (((0.00023917 + (0.004272 * alpha)) + (0.014007 * a_sqr)) + (((0.1302 - (0.075028 * alpha)) + (3.2169 * a_sqr)) * n_v)) + (((-0.03449 - (0.18897 * alpha)) + (0.089879 * a_sqr)) * m_sqr);
+    float q = (((-1.9263e-5 + (0.0054598 * alpha)) + (1.0288 * a_sqr)) + (((0.0019317 - (1.1331 * alpha)) + (5.3123 * a_sqr)) * n_v)) + (((1.0 - (1.3516 * alpha)) - (0.3803 * a_sqr)) * m_sqr);
     return clamp((1.0 - ((alpha * p) / q)), 0.3, 1.0);
 }
 
@@ -134,7 +134,7 @@ float3 multiscatter_compensation(float3 f0_, float n_v, float alpha_t, float alp
 {
     float alpha = sqrt((0.5 * ((alpha_t * alpha_t) + (alpha_b * alpha_b))));
     const float _e11 = ggx_directional_albedo(saturate(n_v), alpha);
-    return ((1.0).xxx + (f0_ * ((1.0 / _e11) - 1.0)));
+    return (1.0).xxx + (f0_ * ((1.0 / _e11) - 1.0));
 }
 
 #endif
@@ -188,7 +188,7 @@ ret_sh_basis sh_basis(float3 direction)
 float3 sh_evaluate(float3 coefficients[9], float3 direction)
 {
     const float _e2[9] = sh_basis(direction);
-    return (((((((((coefficients[0] * _e2[0]) + (coefficients[1] * _e2[1])) + (coefficients[2] * _e2[2])) + (coefficients[3] * _e2[3])) + (coefficients[4] * _e2[4])) + (coefficients[5] * _e2[5])) + (coefficients[6] * _e2[6])) + (coefficients[7] * _e2[7])) + (coefficients[8] * _e2[8]));
+    return ((((((((coefficients[0] * _e2[0]) + (coefficients[1] * _e2[1])) + (coefficients[2] * _e2[2])) + (coefficients[3] * _e2[3])) + (coefficients[4] * _e2[4])) + (coefficients[5] * _e2[5])) + (coefficients[6] * _e2[6])) + (coefficients[7] * _e2[7])) + (coefficients[8] * _e2[8]);
 }
 
 #ifndef KINRAN_RET_CONSTRUCTARRAY9_FLOAT3_HLSL
@@ -269,7 +269,7 @@ float3 sym2_outer(float2 v)
 /// Cost on GCN: 2 instructions.
 float sym2_det(float3 a)
 {
-    return ((a.x * a.z) - (a.y * a.y));
+    return (a.x * a.z) - (a.y * a.y);
 }
 
 /// Trace of a 2×2 matrix.
@@ -277,7 +277,7 @@ float sym2_det(float3 a)
 /// Cost on GCN: 1 instruction.
 float sym2_trace(float3 a)
 {
-    return (a.x + a.z);
+    return a.x + a.z;
 }
 
 /// `v^T A v`.
@@ -285,7 +285,7 @@ float sym2_trace(float3 a)
 /// Cost on GCN: 7 instructions.
 float sym2_quadratic(float3 a, float2 v)
 {
-    return ((((a.x * v.x) * v.x) + (((2.0 * a.y) * v.x) * v.y)) + ((a.z * v.y) * v.y));
+    return (((a.x * v.x) * v.x) + (((2.0 * a.y) * v.x) * v.y)) + ((a.z * v.y) * v.y);
 }
 
 #ifndef KINRAN_CONSTRUCTSYMEIGEN_HLSL
@@ -308,11 +308,11 @@ SymEigen sym2_eigen(float3 a)
 {
     bool local = (bool)0;
 
-    float half_difference = (0.5 * (a.x - a.z));
+    float half_difference = 0.5 * (a.x - a.z);
     float radius = sqrt(((half_difference * half_difference) + (a.y * a.y)));
-    float larger = ((0.5 * (a.x + a.z)) + radius);
+    float larger = (0.5 * (a.x + a.z)) + radius;
     if (!((radius <= (1e-12 * larger)))) {
-        local = (larger <= 0.0);
+        local = larger <= 0.0;
     } else {
         local = true;
     }
@@ -324,9 +324,9 @@ SymEigen sym2_eigen(float3 a)
     const float _e39 = sym2_det(a);
     float smaller = min(max((_e39 / larger), 0.0), larger);
     float long_ = sqrt((0.5 + ((0.5 * abs(half_difference)) / radius)));
-    float short_ = ((0.5 * abs(a.y)) / (radius * long_));
-    float side = ((a.y < 0.0) ? -1.0 : 1.0);
-    float2 axis = ((half_difference >= 0.0) ? float2(long_, (side * short_)) : float2(short_, (side * long_)));
+    float short_ = (0.5 * abs(a.y)) / (radius * long_);
+    float side = (a.y < 0.0) ? -1.0 : 1.0;
+    float2 axis = (half_difference >= 0.0) ? float2(long_, (side * short_)) : float2(short_, (side * long_));
     const SymEigen symeigen_1 = ConstructSymEigen(larger, smaller, axis);
     return symeigen_1;
 }
@@ -341,13 +341,13 @@ float3 sym2_clamp_eigen(float3 a, float lo, float hi)
 
     const SymEigen _e3 = sym2_eigen(a);
     const float3 _e9 = sym2_from_eigen(clamp(_e3.larger, lo, hi), clamp(_e3.smaller, lo, hi), _e3.axis);
-    if ((_e3.larger <= hi)) {
-        local = (_e3.smaller > lo);
+    if (_e3.larger <= hi) {
+        local = _e3.smaller > lo;
     } else {
         local = false;
     }
     bool _e17 = local;
-    return (_e17 ? a : _e9);
+    return _e17 ? a : _e9;
 }
 
 /// The positive semi-definite square root of a positive semi-definite matrix:
@@ -360,10 +360,10 @@ float3 sym2_sqrt(float3 a)
     float root_det = sqrt(max(_e1, 0.0));
     const float _e5 = sym2_trace(a);
     float scale = sqrt((_e5 + (2.0 * root_det)));
-    if ((scale == 0.0)) {
+    if (scale == 0.0) {
         return (0.0).xxx;
     }
-    return ((a + float3(root_det, 0.0, root_det)) * (1.0 / scale));
+    return (a + float3(root_det, 0.0, root_det)) * (1.0 / scale);
 }
 
 /// `v^T A v`.
@@ -379,7 +379,7 @@ float sym3_quadratic(float3x3 a, float3 v)
 /// Cost on GCN: 2 instructions.
 float sym3_trace(float3x3 a)
 {
-    return ((a[0].x + a[1].y) + a[2].z);
+    return (a[0].x + a[1].y) + a[2].z;
 }
 
 /// The adjugate of a symmetric matrix: `A adj(A) = det(A) I`. Its columns are the cross products of A's.
@@ -447,8 +447,8 @@ float alpha_from_gloss(float gloss)
 /// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 float3 aniso_encode(float3 s)
 {
-    float product = (s.x * s.z);
-    float rho = ((product > 0.0) ? clamp((s.y * rsqrt(product)), -1.0, 1.0) : 0.0);
+    float product = s.x * s.z;
+    float rho = (product > 0.0) ? clamp((s.y * rsqrt(product)), -1.0, 1.0) : 0.0;
     return float3(sqrt(saturate(s.x)), ((0.5 * rho) + 0.5), sqrt(saturate(s.z)));
 }
 
@@ -486,22 +486,22 @@ AnisoDecoded ConstructAnisoDecoded(float arg0, float arg1, float3 arg2, float3 a
 /// Cost on GCN: 36 instructions (5 at a quarter of the rate).
 AnisoDecoded aniso_decode(float3 texel, float3 tangent, float3 bitangent)
 {
-    float rho = ((texel.y * 2.0) - 1.0);
-    float product = (texel.x * texel.z);
-    float sxy = (product * rho);
-    float sxx = ((texel.x * texel.x) + 1e-12);
-    float syy = (texel.z * texel.z);
-    float half_difference = (0.5 * (sxx - syy));
-    float discr_sqr = (4.0 * ((half_difference * half_difference) + (sxy * sxy)));
+    float rho = (texel.y * 2.0) - 1.0;
+    float product = texel.x * texel.z;
+    float sxy = product * rho;
+    float sxx = (texel.x * texel.x) + 1e-12;
+    float syy = texel.z * texel.z;
+    float half_difference = 0.5 * (sxx - syy);
+    float discr_sqr = 4.0 * ((half_difference * half_difference) + (sxy * sxy));
     float discr_rcp = rsqrt(discr_sqr);
-    float alpha_t_sqr = (0.5 * ((sxx + syy) + (discr_sqr * discr_rcp)));
+    float alpha_t_sqr = 0.5 * ((sxx + syy) + (discr_sqr * discr_rcp));
     float alpha_t_rcp = rsqrt(alpha_t_sqr);
-    float alpha_t = (alpha_t_sqr * alpha_t_rcp);
-    float alpha_b = ((product * sqrt((1.0 - (rho * rho)))) * alpha_t_rcp);
+    float alpha_t = alpha_t_sqr * alpha_t_rcp;
+    float alpha_b = (product * sqrt((1.0 - (rho * rho)))) * alpha_t_rcp;
     float c_sqr = saturate(((half_difference * discr_rcp) + 0.5));
     float c = sqrt(c_sqr);
     float s_abs = sqrt((1.0 - c_sqr));
-    float s = ((sxy < 0.0) ? -(s_abs) : s_abs);
+    float s = (sxy < 0.0) ? -(s_abs) : s_abs;
     const AnisoDecoded anisodecoded = ConstructAnisoDecoded(clamp(alpha_t, ALPHA_MIN, 1.0), clamp(alpha_b, ALPHA_MIN, 1.0), ((c * tangent) + (s * bitangent)), ((c * bitangent) - (s * tangent)));
     return anisodecoded;
 }
@@ -525,7 +525,7 @@ float2 axis_from_direction(float2 direction, float3 n)
     const float3x3 _e2 = m_n(n);
     float2 axis = float2(dot(_e2[0].xy, direction), dot(_e2[1].xy, direction));
     float length_squared = dot(axis, axis);
-    return ((length_squared > 1e-12) ? (axis * rsqrt(length_squared)) : direction);
+    return (length_squared > 1e-12) ? (axis * rsqrt(length_squared)) : direction;
 }
 
 /// The inverse of `axis_from_direction`: the unit direction in the mesh's tangent plane that Gram–Schmidt against `n`
@@ -535,10 +535,10 @@ float2 axis_from_direction(float2 direction, float3 n)
 float2 direction_from_axis(float2 axis, float3 n)
 {
     const float3x3 _e2 = m_n(n);
-    float3 t = ((_e2[0] * axis.x) + (_e2[1] * axis.y));
-    float2 d = ((t.xy * n.z) - (t.z * n.xy));
+    float3 t = (_e2[0] * axis.x) + (_e2[1] * axis.y);
+    float2 d = (t.xy * n.z) - (t.z * n.xy);
     float length_squared = dot(d, d);
-    return ((length_squared > 1e-12) ? (d * rsqrt(length_squared)) : axis);
+    return (length_squared > 1e-12) ? (d * rsqrt(length_squared)) : axis;
 }
 
 /// Principal alphas (alpha_t, alpha_b) of `KHR_materials_anisotropy`: `alpha_b = roughness²`,
@@ -557,8 +557,8 @@ float2 alphas_from_khr_anisotropy(float roughness, float strength)
 /// Cost on GCN: 8 instructions (3 at a quarter of the rate).
 float2 khr_anisotropy_from_alphas(float alpha_t, float alpha_b)
 {
-    float rest = (1.0 - alpha_b);
-    float strength = ((rest > 0.0) ? sqrt(saturate(((alpha_t - alpha_b) / rest))) : 0.0);
+    float rest = 1.0 - alpha_b;
+    float strength = (rest > 0.0) ? sqrt(saturate(((alpha_t - alpha_b) / rest))) : 0.0;
     return float2(sqrt(alpha_b), strength);
 }
 
@@ -593,9 +593,9 @@ static const float FRAC_1_PI = 0.31830987;
 /// Cost on GCN: 10 instructions (1 at a quarter of the rate).
 float ggx_d(float n_h, float alpha)
 {
-    float a_sqr = (alpha * alpha);
-    float q = (((1.0 - n_h) * (1.0 + n_h)) + ((a_sqr * n_h) * n_h));
-    return ((a_sqr * FRAC_1_PI) / (q * q));
+    float a_sqr = alpha * alpha;
+    float q = ((1.0 - n_h) * (1.0 + n_h)) + ((a_sqr * n_h) * n_h);
+    return (a_sqr * FRAC_1_PI) / (q * q);
 }
 
 /// Anisotropic distribution of microfacet normals per steradian (slide: Our Algorithm, the form with
@@ -604,10 +604,10 @@ float ggx_d(float n_h, float alpha)
 /// Cost on GCN: 12 instructions (1 at a quarter of the rate).
 float ggx_aniso_d(float3 h, float alpha_t, float alpha_b)
 {
-    float alpha_tb = (alpha_t * alpha_b);
+    float alpha_tb = alpha_t * alpha_b;
     float3 v = float3((h.x * alpha_b), (h.y * alpha_t), (h.z * alpha_tb));
-    float w = (alpha_tb / dot(v, v));
-    return (((alpha_tb * FRAC_1_PI) * w) * w);
+    float w = alpha_tb / dot(v, v);
+    return ((alpha_tb * FRAC_1_PI) * w) * w;
 }
 
 /// `ggx_aniso_d` from the squared roughness matrix `a` (xx, xy, yy), with no eigen decode:
@@ -618,8 +618,8 @@ float ggx_matrix_d(float3 h, float3 a)
 {
     const float _e2 = sym2_det(a);
     const float _e9 = sym2_quadratic(float3(a.z, -(a.y), a.x), h.xy);
-    float w = (_e2 / (_e9 + ((_e2 * h.z) * h.z)));
-    return (((rsqrt(_e2) * FRAC_1_PI) * w) * w);
+    float w = _e2 / (_e9 + ((_e2 * h.z) * h.z));
+    return ((rsqrt(_e2) * FRAC_1_PI) * w) * w;
 }
 
 /// Visibility from the two terms of `2 n·u n·v (1 + Λ(u) + Λ(v))`: `n·v |u'|` and `n·u |v'|`, where the prime
@@ -628,7 +628,7 @@ float ggx_matrix_d(float3 h, float3 a)
 /// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 float smith_v_of_terms(float u, float v)
 {
-    return (0.5 / max((u + v), MIN_POSITIVE));
+    return 0.5 / max((u + v), MIN_POSITIVE);
 }
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, isotropic (Heitz 2014, eq. 99).
@@ -636,9 +636,9 @@ float smith_v_of_terms(float u, float v)
 /// Cost on GCN: 12 instructions (3 at a quarter of the rate).
 float smith_v(float n_u, float n_v, float alpha)
 {
-    float a_sqr = (alpha * alpha);
-    float v = (n_u * sqrt((((n_v * n_v) * (1.0 - a_sqr)) + a_sqr)));
-    float u = (n_v * sqrt((((n_u * n_u) * (1.0 - a_sqr)) + a_sqr)));
+    float a_sqr = alpha * alpha;
+    float v = n_u * sqrt((((n_v * n_v) * (1.0 - a_sqr)) + a_sqr));
+    float u = n_v * sqrt((((n_u * n_u) * (1.0 - a_sqr)) + a_sqr));
     const float _e18 = smith_v_of_terms(u, v);
     return _e18;
 }
@@ -672,7 +672,7 @@ float smith_matrix_v(float3 u, float3 v, float3 a)
 /// Cost on GCN: 10 instructions (2 at a quarter of the rate).
 float smith_aniso_g1(float3 v, float alpha_t, float alpha_b)
 {
-    return ((2.0 * v.z) / (v.z + length((v * float3(alpha_t, alpha_b, 1.0)))));
+    return (2.0 * v.z) / (v.z + length((v * float3(alpha_t, alpha_b, 1.0))));
 }
 
 /// Fresnel reflectance by Schlick's approximation (1994) from `f0` at normal incidence to one at grazing.
@@ -681,8 +681,8 @@ float smith_aniso_g1(float3 v, float alpha_t, float alpha_b)
 float3 schlick_f(float3 f0_1, float v_h)
 {
     float m = saturate((1.0 - v_h));
-    float m_sqr = (m * m);
-    return (f0_1 + (((1.0).xxx - f0_1) * ((m_sqr * m_sqr) * m)));
+    float m_sqr = m * m;
+    return f0_1 + (((1.0).xxx - f0_1) * ((m_sqr * m_sqr) * m));
 }
 
 /// A microfacet normal distributed as `ggx_vndf_pdf` for the view direction `v`, from two uniform numbers in [0, 1)
@@ -693,13 +693,13 @@ float3 ggx_vndf_sample(float3 v, float alpha_t, float alpha_b, float2 xi)
 {
     float3 stretch = float3(alpha_t, alpha_b, 1.0);
     float3 v_std = normalize((v * stretch));
-    float phi = (6.2831855 * xi.x);
-    float z = (((1.0 - xi.y) * (1.0 + v_std.z)) - v_std.z);
+    float phi = 6.2831855 * xi.x;
+    float z = ((1.0 - xi.y) * (1.0 + v_std.z)) - v_std.z;
     float sin_theta = sqrt(max((1.0 - (z * z)), 0.0));
     float3 cap = float3((sin_theta * cos(phi)), (sin_theta * sin(phi)), z);
-    float3 h = ((cap + v_std) * stretch);
+    float3 h = (cap + v_std) * stretch;
     float length_squared = dot(h, h);
-    return ((length_squared > 0.0) ? (h * rsqrt(length_squared)) : float3(0.0, 0.0, 1.0));
+    return (length_squared > 0.0) ? (h * rsqrt(length_squared)) : float3(0.0, 0.0, 1.0);
 }
 
 /// Density per steradian of microfacet normals visible from `v`: `G1(v) max(v·h, 0) D(h) / n·v` (Heitz 2014, eq. 16).
@@ -708,12 +708,12 @@ float3 ggx_vndf_sample(float3 v, float alpha_t, float alpha_b, float2 xi)
 /// Cost on GCN: 29 instructions (3 at a quarter of the rate).
 float ggx_vndf_pdf(float3 v, float3 h, float alpha_t, float alpha_b)
 {
-    if ((h.z <= 0.0)) {
+    if (h.z <= 0.0) {
         return 0.0;
     }
-    float g_over_n_v = (2.0 / (v.z + length((v * float3(alpha_t, alpha_b, 1.0)))));
+    float g_over_n_v = 2.0 / (v.z + length((v * float3(alpha_t, alpha_b, 1.0))));
     const float _e20 = ggx_aniso_d(h, alpha_t, alpha_b);
-    return ((g_over_n_v * max(dot(v, h), 0.0)) * _e20);
+    return (g_over_n_v * max(dot(v, h), 0.0)) * _e20;
 }
 
 #endif
@@ -750,8 +750,8 @@ struct SlopeDistribution {
 float3x3 sggx_from_ggx(float3 n, float3 a)
 {
     const float3x3 _e2 = m_n(n);
-    float3 ax = ((_e2[0] * a.x) + (_e2[1] * a.y));
-    float3 ay = ((_e2[0] * a.y) + (_e2[1] * a.z));
+    float3 ax = (_e2[0] * a.x) + (_e2[1] * a.y);
+    float3 ay = (_e2[0] * a.y) + (_e2[1] * a.z);
     return float3x3((((ax * _e2[0].x) + (ay * _e2[1].x)) + (n * n.x)), (((ax * _e2[0].y) + (ay * _e2[1].y)) + (n * n.y)), (((ax * _e2[0].z) + (ay * _e2[1].z)) + (n * n.z)));
 }
 
@@ -774,7 +774,7 @@ float sggx_d(float3x3 s, float3 h)
     const float _e2 = sym3_det(s);
     const float3x3 _e3 = sym3_adjugate(s);
     const float _e4 = sym3_quadratic(_e3, h);
-    return ((_e2 * sqrt(_e2)) / ((3.1415927 * _e4) * _e4));
+    return (_e2 * sqrt(_e2)) / ((3.1415927 * _e4) * _e4);
 }
 
 #ifndef KINRAN_CONSTRUCTSLOPEDISTRIBUTION_HLSL
@@ -793,9 +793,9 @@ SlopeDistribution ConstructSlopeDistribution(float2 arg0, float3 arg1) {
 /// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 SlopeDistribution slopes_from_sggx(float3x3 s)
 {
-    float inv = (1.0 / s[2].z);
-    float2 m = (s[2].xy * inv);
-    float3 a = ((float3(s[0].x, s[0].y, s[1].y) * inv) - float3((m.x * m.x), (m.x * m.y), (m.y * m.y)));
+    float inv = 1.0 / s[2].z;
+    float2 m = s[2].xy * inv;
+    float3 a = (float3(s[0].x, s[0].y, s[1].y) * inv) - float3((m.x * m.x), (m.x * m.y), (m.y * m.y));
     const SlopeDistribution slopedistribution = ConstructSlopeDistribution(m, a);
     return slopedistribution;
 }
@@ -805,7 +805,7 @@ SlopeDistribution slopes_from_sggx(float3x3 s)
 /// Cost on GCN: 3 instructions.
 float3x3 sggx_from_slopes(float2 m, float3 a)
 {
-    float xy = (a.y + (m.x * m.y));
+    float xy = a.y + (m.x * m.y);
     return float3x3(float3((a.x + (m.x * m.x)), xy, m.x), float3(xy, (a.z + (m.y * m.y)), m.y), float3(m, 1.0));
 }
 
@@ -820,26 +820,26 @@ float3 sggx_power_iteration(float3x3 s, float3 start, uint steps)
     uint i = 0u;
 
     const float _e3 = sym3_trace(s);
-    float scale = (1.0 / max(_e3, 1e-30));
+    float scale = 1.0 / max(_e3, 1e-30);
     n = start;
     bool loop_init = true;
     while(true) {
         if (!loop_init) {
             uint _e24 = i;
-            i = (_e24 + 1u);
+            i = _e24 + 1u;
         }
         loop_init = false;
         uint _e11 = i;
-        if ((_e11 < steps)) {
+        if (_e11 < steps) {
         } else {
             break;
         }
         {
             float3 _e13 = n;
-            float3 next = (mul(_e13, s) * scale);
+            float3 next = mul(_e13, s) * scale;
             float length_squared = dot(next, next);
             float3 _e17 = n;
-            n = ((length_squared > 0.0) ? (next * rsqrt(length_squared)) : _e17);
+            n = (length_squared > 0.0) ? (next * rsqrt(length_squared)) : _e17;
         }
     }
     float3 _e26 = n;
@@ -851,7 +851,7 @@ float3 sggx_power_iteration(float3x3 s, float3 start, uint steps)
 /// Cost on GCN: 7 instructions (1 at a quarter of the rate).
 float sggx_overlap(float l, float moment, float moment_sqr)
 {
-    return ((((moment_sqr + (l * moment)) + (l * l)) - 3.0) / (((3.0 * l) * l) - 3.0));
+    return (((moment_sqr + (l * moment)) + (l * l)) - 3.0) / (((3.0 * l) * l) - 3.0);
 }
 
 /// The unit eigenvector of `s` with the largest overlap with the unit vector `start`, signed to agree with it.
@@ -867,40 +867,40 @@ float3 sggx_principal_axis(float3x3 s, float3 start)
 
     float3x3 identity = float3x3(float3(1.0, 0.0, 0.0), float3(0.0, 1.0, 0.0), float3(0.0, 0.0, 1.0));
     const float _e17 = sym3_trace(s);
-    float3x3 deviator = (mul((1.0 / _e17), s) - mul(0.33333334, identity));
-    float squares = ((dot(deviator[0], deviator[0]) + dot(deviator[1], deviator[1])) + dot(deviator[2], deviator[2]));
+    float3x3 deviator = mul((1.0 / _e17), s) - mul(0.33333334, identity);
+    float squares = (dot(deviator[0], deviator[0]) + dot(deviator[1], deviator[1])) + dot(deviator[2], deviator[2]);
     float size = sqrt((squares * 0.16666667));
     float3x3 unit = mul((1.0 / size), deviator);
     const float _e41 = sym3_det(unit);
-    float r = (0.5 * _e41);
+    float r = 0.5 * _e41;
     float3x3 b = mul(((r < 0.0) ? -1.0 : 1.0), unit);
     float t_sqr = max((0.5 - (0.5 * abs(r))), 0.0);
-    float series = (1.0 + (t_sqr * (0.09259259 + (t_sqr * (0.039609052 + (t_sqr * 0.023157675))))));
-    float sine = ((sqrt(t_sqr) * 0.6666667) * series);
+    float series = 1.0 + (t_sqr * (0.09259259 + (t_sqr * (0.039609052 + (t_sqr * 0.023157675)))));
+    float sine = (sqrt(t_sqr) * 0.6666667) * series;
     float cosine = sqrt((1.0 - (sine * sine)));
-    float l_first = (2.0 * cosine);
-    float l_second = ((1.7320508 * sine) - cosine);
-    float l_third = ((-(1.7320508) * sine) - cosine);
+    float l_first = 2.0 * cosine;
+    float l_second = (1.7320508 * sine) - cosine;
+    float l_third = (-(1.7320508) * sine) - cosine;
     float3 bn = mul(start, b);
     float moment = dot(start, bn);
     float moment_sqr = dot(bn, bn);
     const float _e85 = sggx_overlap(l_first, moment, moment_sqr);
     float w_first = saturate(_e85);
-    bool coincident = (sine < 0.001);
-    float rest = (1.0 - w_first);
+    bool coincident = sine < 0.001;
+    float rest = 1.0 - w_first;
     const float _e90 = sggx_overlap(l_second, moment, moment_sqr);
-    float w_second = (coincident ? rest : min(max(_e90, 0.0), rest));
-    float w_third = ((1.0 - w_first) - w_second);
-    bool is_first = (w_first >= max(w_second, w_third));
-    float3 p = (bn - (start * (is_first ? l_second : l_first)));
+    float w_second = coincident ? rest : min(max(_e90, 0.0), rest);
+    float w_third = (1.0 - w_first) - w_second;
+    bool is_first = w_first >= max(w_second, w_third);
+    float3 p = bn - (start * (is_first ? l_second : l_first));
     if (!(is_first)) {
-        local_2 = (w_second >= w_third);
+        local_2 = w_second >= w_third;
     } else {
         local_2 = true;
     }
     bool _e108 = local_2;
-    float other = (_e108 ? l_third : l_second);
-    float3 q = (mul(p, b) - (p * other));
+    float other = _e108 ? l_third : l_second;
+    float3 q = mul(p, b) - (p * other);
     if (coincident) {
         local_3 = !(is_first);
     } else {
@@ -912,10 +912,10 @@ float3 sggx_principal_axis(float3x3 s, float3 start)
     const float3x3 _e123 = sym3_adjugate((b - mul(_e120, identity)));
     float3 refined = mul(projected, _e123);
     float refined_length = length(refined);
-    bool far = (refined_length > ((6.0 * 1.7320508) * 0.001));
-    float3 axis = (far ? (refined * (1.0 / refined_length)) : projected);
-    float3 n = ((size > 3e-6) ? axis : start);
-    return ((dot(n, start) < 0.0) ? -(n) : n);
+    bool far = refined_length > ((6.0 * 1.7320508) * 0.001);
+    float3 axis = far ? (refined * (1.0 / refined_length)) : projected;
+    float3 n = (size > 3e-6) ? axis : start;
+    return (dot(n, start) < 0.0) ? -(n) : n;
 }
 
 #ifndef KINRAN_CONSTRUCTGGXSURFACE_HLSL
@@ -934,12 +934,12 @@ GgxSurface ConstructGgxSurface(float3 arg0, float3 arg1) {
 GgxSurface ggx_from_sggx_unclamped(float3x3 s, float3 mean_normal)
 {
     const float3 _e2 = sggx_principal_axis(s, mean_normal);
-    float3 n = ((_e2.z < 0.0) ? -(_e2) : _e2);
+    float3 n = (_e2.z < 0.0) ? -(_e2) : _e2;
     const float3x3 _e8 = m_n(n);
     float3 sx = mul(_e8[0], s);
     float3 sy = mul(_e8[1], s);
     const float _e13 = sym3_quadratic(s, n);
-    float inv = (1.0 / max(_e13, 1e-30));
+    float inv = 1.0 / max(_e13, 1e-30);
     const GgxSurface ggxsurface = ConstructGgxSurface(n, (float3(dot(_e8[0], sx), dot(_e8[0], sy), dot(_e8[1], sy)) * inv));
     return ggxsurface;
 }

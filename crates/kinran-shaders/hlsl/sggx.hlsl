@@ -32,8 +32,8 @@ struct SlopeDistribution {
 float3x3 sggx_from_ggx(float3 n, float3 a)
 {
     const float3x3 _e2 = m_n(n);
-    float3 ax = ((_e2[0] * a.x) + (_e2[1] * a.y));
-    float3 ay = ((_e2[0] * a.y) + (_e2[1] * a.z));
+    float3 ax = (_e2[0] * a.x) + (_e2[1] * a.y);
+    float3 ay = (_e2[0] * a.y) + (_e2[1] * a.z);
     return float3x3((((ax * _e2[0].x) + (ay * _e2[1].x)) + (n * n.x)), (((ax * _e2[0].y) + (ay * _e2[1].y)) + (n * n.y)), (((ax * _e2[0].z) + (ay * _e2[1].z)) + (n * n.z)));
 }
 
@@ -56,7 +56,7 @@ float sggx_d(float3x3 s, float3 h)
     const float _e2 = sym3_det(s);
     const float3x3 _e3 = sym3_adjugate(s);
     const float _e4 = sym3_quadratic(_e3, h);
-    return ((_e2 * sqrt(_e2)) / ((3.1415927 * _e4) * _e4));
+    return (_e2 * sqrt(_e2)) / ((3.1415927 * _e4) * _e4);
 }
 
 #ifndef KINRAN_CONSTRUCTSLOPEDISTRIBUTION_HLSL
@@ -75,9 +75,9 @@ SlopeDistribution ConstructSlopeDistribution(float2 arg0, float3 arg1) {
 /// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 SlopeDistribution slopes_from_sggx(float3x3 s)
 {
-    float inv = (1.0 / s[2].z);
-    float2 m = (s[2].xy * inv);
-    float3 a = ((float3(s[0].x, s[0].y, s[1].y) * inv) - float3((m.x * m.x), (m.x * m.y), (m.y * m.y)));
+    float inv = 1.0 / s[2].z;
+    float2 m = s[2].xy * inv;
+    float3 a = (float3(s[0].x, s[0].y, s[1].y) * inv) - float3((m.x * m.x), (m.x * m.y), (m.y * m.y));
     const SlopeDistribution slopedistribution = ConstructSlopeDistribution(m, a);
     return slopedistribution;
 }
@@ -87,7 +87,7 @@ SlopeDistribution slopes_from_sggx(float3x3 s)
 /// Cost on GCN: 3 instructions.
 float3x3 sggx_from_slopes(float2 m, float3 a)
 {
-    float xy = (a.y + (m.x * m.y));
+    float xy = a.y + (m.x * m.y);
     return float3x3(float3((a.x + (m.x * m.x)), xy, m.x), float3(xy, (a.z + (m.y * m.y)), m.y), float3(m, 1.0));
 }
 
@@ -102,26 +102,26 @@ float3 sggx_power_iteration(float3x3 s, float3 start, uint steps)
     uint i = 0u;
 
     const float _e3 = sym3_trace(s);
-    float scale = (1.0 / max(_e3, 1e-30));
+    float scale = 1.0 / max(_e3, 1e-30);
     n = start;
     bool loop_init = true;
     while(true) {
         if (!loop_init) {
             uint _e24 = i;
-            i = (_e24 + 1u);
+            i = _e24 + 1u;
         }
         loop_init = false;
         uint _e11 = i;
-        if ((_e11 < steps)) {
+        if (_e11 < steps) {
         } else {
             break;
         }
         {
             float3 _e13 = n;
-            float3 next = (mul(_e13, s) * scale);
+            float3 next = mul(_e13, s) * scale;
             float length_squared = dot(next, next);
             float3 _e17 = n;
-            n = ((length_squared > 0.0) ? (next * rsqrt(length_squared)) : _e17);
+            n = (length_squared > 0.0) ? (next * rsqrt(length_squared)) : _e17;
         }
     }
     float3 _e26 = n;
@@ -133,7 +133,7 @@ float3 sggx_power_iteration(float3x3 s, float3 start, uint steps)
 /// Cost on GCN: 7 instructions (1 at a quarter of the rate).
 float sggx_overlap(float l, float moment, float moment_sqr)
 {
-    return ((((moment_sqr + (l * moment)) + (l * l)) - 3.0) / (((3.0 * l) * l) - 3.0));
+    return (((moment_sqr + (l * moment)) + (l * l)) - 3.0) / (((3.0 * l) * l) - 3.0);
 }
 
 /// The unit eigenvector of `s` with the largest overlap with the unit vector `start`, signed to agree with it.
@@ -149,40 +149,40 @@ float3 sggx_principal_axis(float3x3 s, float3 start)
 
     float3x3 identity = float3x3(float3(1.0, 0.0, 0.0), float3(0.0, 1.0, 0.0), float3(0.0, 0.0, 1.0));
     const float _e17 = sym3_trace(s);
-    float3x3 deviator = (mul((1.0 / _e17), s) - mul(0.33333334, identity));
-    float squares = ((dot(deviator[0], deviator[0]) + dot(deviator[1], deviator[1])) + dot(deviator[2], deviator[2]));
+    float3x3 deviator = mul((1.0 / _e17), s) - mul(0.33333334, identity);
+    float squares = (dot(deviator[0], deviator[0]) + dot(deviator[1], deviator[1])) + dot(deviator[2], deviator[2]);
     float size = sqrt((squares * 0.16666667));
     float3x3 unit = mul((1.0 / size), deviator);
     const float _e41 = sym3_det(unit);
-    float r = (0.5 * _e41);
+    float r = 0.5 * _e41;
     float3x3 b = mul(((r < 0.0) ? -1.0 : 1.0), unit);
     float t_sqr = max((0.5 - (0.5 * abs(r))), 0.0);
-    float series = (1.0 + (t_sqr * (0.09259259 + (t_sqr * (0.039609052 + (t_sqr * 0.023157675))))));
-    float sine = ((sqrt(t_sqr) * 0.6666667) * series);
+    float series = 1.0 + (t_sqr * (0.09259259 + (t_sqr * (0.039609052 + (t_sqr * 0.023157675)))));
+    float sine = (sqrt(t_sqr) * 0.6666667) * series;
     float cosine = sqrt((1.0 - (sine * sine)));
-    float l_first = (2.0 * cosine);
-    float l_second = ((1.7320508 * sine) - cosine);
-    float l_third = ((-(1.7320508) * sine) - cosine);
+    float l_first = 2.0 * cosine;
+    float l_second = (1.7320508 * sine) - cosine;
+    float l_third = (-(1.7320508) * sine) - cosine;
     float3 bn = mul(start, b);
     float moment = dot(start, bn);
     float moment_sqr = dot(bn, bn);
     const float _e85 = sggx_overlap(l_first, moment, moment_sqr);
     float w_first = saturate(_e85);
-    bool coincident = (sine < 0.001);
-    float rest = (1.0 - w_first);
+    bool coincident = sine < 0.001;
+    float rest = 1.0 - w_first;
     const float _e90 = sggx_overlap(l_second, moment, moment_sqr);
-    float w_second = (coincident ? rest : min(max(_e90, 0.0), rest));
-    float w_third = ((1.0 - w_first) - w_second);
-    bool is_first = (w_first >= max(w_second, w_third));
-    float3 p = (bn - (start * (is_first ? l_second : l_first)));
+    float w_second = coincident ? rest : min(max(_e90, 0.0), rest);
+    float w_third = (1.0 - w_first) - w_second;
+    bool is_first = w_first >= max(w_second, w_third);
+    float3 p = bn - (start * (is_first ? l_second : l_first));
     if (!(is_first)) {
-        local_2 = (w_second >= w_third);
+        local_2 = w_second >= w_third;
     } else {
         local_2 = true;
     }
     bool _e108 = local_2;
-    float other = (_e108 ? l_third : l_second);
-    float3 q = (mul(p, b) - (p * other));
+    float other = _e108 ? l_third : l_second;
+    float3 q = mul(p, b) - (p * other);
     if (coincident) {
         local_3 = !(is_first);
     } else {
@@ -194,10 +194,10 @@ float3 sggx_principal_axis(float3x3 s, float3 start)
     const float3x3 _e123 = sym3_adjugate((b - mul(_e120, identity)));
     float3 refined = mul(projected, _e123);
     float refined_length = length(refined);
-    bool far = (refined_length > ((6.0 * 1.7320508) * 0.001));
-    float3 axis = (far ? (refined * (1.0 / refined_length)) : projected);
-    float3 n = ((size > 3e-6) ? axis : start);
-    return ((dot(n, start) < 0.0) ? -(n) : n);
+    bool far = refined_length > ((6.0 * 1.7320508) * 0.001);
+    float3 axis = far ? (refined * (1.0 / refined_length)) : projected;
+    float3 n = (size > 3e-6) ? axis : start;
+    return (dot(n, start) < 0.0) ? -(n) : n;
 }
 
 #ifndef KINRAN_CONSTRUCTGGXSURFACE_HLSL
@@ -216,12 +216,12 @@ GgxSurface ConstructGgxSurface(float3 arg0, float3 arg1) {
 GgxSurface ggx_from_sggx_unclamped(float3x3 s, float3 mean_normal)
 {
     const float3 _e2 = sggx_principal_axis(s, mean_normal);
-    float3 n = ((_e2.z < 0.0) ? -(_e2) : _e2);
+    float3 n = (_e2.z < 0.0) ? -(_e2) : _e2;
     const float3x3 _e8 = m_n(n);
     float3 sx = mul(_e8[0], s);
     float3 sy = mul(_e8[1], s);
     const float _e13 = sym3_quadratic(s, n);
-    float inv = (1.0 / max(_e13, 1e-30));
+    float inv = 1.0 / max(_e13, 1e-30);
     const GgxSurface ggxsurface = ConstructGgxSurface(n, (float3(dot(_e8[0], sx), dot(_e8[0], sy), dot(_e8[1], sy)) * inv));
     return ggxsurface;
 }

@@ -47,7 +47,7 @@ ret_sh_basis sh_basis(float3 direction)
 float3 sh_evaluate(float3 coefficients[9], float3 direction)
 {
     const float _e2[9] = sh_basis(direction);
-    return (((((((((coefficients[0] * _e2[0]) + (coefficients[1] * _e2[1])) + (coefficients[2] * _e2[2])) + (coefficients[3] * _e2[3])) + (coefficients[4] * _e2[4])) + (coefficients[5] * _e2[5])) + (coefficients[6] * _e2[6])) + (coefficients[7] * _e2[7])) + (coefficients[8] * _e2[8]));
+    return ((((((((coefficients[0] * _e2[0]) + (coefficients[1] * _e2[1])) + (coefficients[2] * _e2[2])) + (coefficients[3] * _e2[3])) + (coefficients[4] * _e2[4])) + (coefficients[5] * _e2[5])) + (coefficients[6] * _e2[6])) + (coefficients[7] * _e2[7])) + (coefficients[8] * _e2[8]);
 }
 
 #ifndef KINRAN_RET_CONSTRUCTARRAY9_FLOAT3_HLSL

@@ -36,7 +36,7 @@ float3 sym2_outer(float2 v)
 /// Cost on GCN: 2 instructions.
 float sym2_det(float3 a)
 {
-    return ((a.x * a.z) - (a.y * a.y));
+    return (a.x * a.z) - (a.y * a.y);
 }
 
 /// Trace of a 2×2 matrix.
@@ -44,7 +44,7 @@ float sym2_det(float3 a)
 /// Cost on GCN: 1 instruction.
 float sym2_trace(float3 a)
 {
-    return (a.x + a.z);
+    return a.x + a.z;
 }
 
 /// `v^T A v`.
@@ -52,7 +52,7 @@ float sym2_trace(float3 a)
 /// Cost on GCN: 7 instructions.
 float sym2_quadratic(float3 a, float2 v)
 {
-    return ((((a.x * v.x) * v.x) + (((2.0 * a.y) * v.x) * v.y)) + ((a.z * v.y) * v.y));
+    return (((a.x * v.x) * v.x) + (((2.0 * a.y) * v.x) * v.y)) + ((a.z * v.y) * v.y);
 }
 
 #ifndef KINRAN_CONSTRUCTSYMEIGEN_HLSL
@@ -75,11 +75,11 @@ SymEigen sym2_eigen(float3 a)
 {
     bool local = (bool)0;
 
-    float half_difference = (0.5 * (a.x - a.z));
+    float half_difference = 0.5 * (a.x - a.z);
     float radius = sqrt(((half_difference * half_difference) + (a.y * a.y)));
-    float larger = ((0.5 * (a.x + a.z)) + radius);
+    float larger = (0.5 * (a.x + a.z)) + radius;
     if (!((radius <= (1e-12 * larger)))) {
-        local = (larger <= 0.0);
+        local = larger <= 0.0;
     } else {
         local = true;
     }
@@ -91,9 +91,9 @@ SymEigen sym2_eigen(float3 a)
     const float _e39 = sym2_det(a);
     float smaller = min(max((_e39 / larger), 0.0), larger);
     float long_ = sqrt((0.5 + ((0.5 * abs(half_difference)) / radius)));
-    float short_ = ((0.5 * abs(a.y)) / (radius * long_));
-    float side = ((a.y < 0.0) ? -1.0 : 1.0);
-    float2 axis = ((half_difference >= 0.0) ? float2(long_, (side * short_)) : float2(short_, (side * long_)));
+    float short_ = (0.5 * abs(a.y)) / (radius * long_);
+    float side = (a.y < 0.0) ? -1.0 : 1.0;
+    float2 axis = (half_difference >= 0.0) ? float2(long_, (side * short_)) : float2(short_, (side * long_));
     const SymEigen symeigen_1 = ConstructSymEigen(larger, smaller, axis);
     return symeigen_1;
 }
@@ -108,13 +108,13 @@ float3 sym2_clamp_eigen(float3 a, float lo, float hi)
 
     const SymEigen _e3 = sym2_eigen(a);
     const float3 _e9 = sym2_from_eigen(clamp(_e3.larger, lo, hi), clamp(_e3.smaller, lo, hi), _e3.axis);
-    if ((_e3.larger <= hi)) {
-        local = (_e3.smaller > lo);
+    if (_e3.larger <= hi) {
+        local = _e3.smaller > lo;
     } else {
         local = false;
     }
     bool _e17 = local;
-    return (_e17 ? a : _e9);
+    return _e17 ? a : _e9;
 }
 
 /// The positive semi-definite square root of a positive semi-definite matrix:
@@ -127,10 +127,10 @@ float3 sym2_sqrt(float3 a)
     float root_det = sqrt(max(_e1, 0.0));
     const float _e5 = sym2_trace(a);
     float scale = sqrt((_e5 + (2.0 * root_det)));
-    if ((scale == 0.0)) {
+    if (scale == 0.0) {
         return (0.0).xxx;
     }
-    return ((a + float3(root_det, 0.0, root_det)) * (1.0 / scale));
+    return (a + float3(root_det, 0.0, root_det)) * (1.0 / scale);
 }
 
 /// `v^T A v`.
@@ -146,7 +146,7 @@ float sym3_quadratic(float3x3 a, float3 v)
 /// Cost on GCN: 2 instructions.
 float sym3_trace(float3x3 a)
 {
-    return ((a[0].x + a[1].y) + a[2].z);
+    return (a[0].x + a[1].y) + a[2].z;
 }
 
 /// The adjugate of a symmetric matrix: `A adj(A) = det(A) I`. Its columns are the cross products of A's.

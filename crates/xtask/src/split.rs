@@ -23,7 +23,7 @@ pub(crate) fn split(text: &str) -> Result<Vec<Chunk>, Error> {
         if between && (line.trim().is_empty() || line.starts_with("//") || is_directive) {
             continue;
         }
-        open += &format!("{}\n", line.trim_end());
+        open += &format!("{}\n", without_parentheses(line.trim_end()));
         let depth = open.matches('{').count().checked_sub(open.matches('}').count());
         if depth.ok_or("a brace too many")? == 0 && line.trim_end().ends_with(['}', ';']) {
             let text = std::mem::take(&mut open);
@@ -31,6 +31,23 @@ pub(crate) fn split(text: &str) -> Result<Vec<Chunk>, Error> {
         }
     }
     if open.is_empty() { Ok(chunks) } else { Err(format!("a declaration has no end: {open}").into()) }
+}
+
+/// A line whose whole expression naga put in parentheses, without them; DXC warns of them around a comparison.
+fn without_parentheses(line: &str) -> String {
+    for (before, after) in [("return (", ");"), (" = (", ");"), ("if ((", ")) {")] {
+        let Some((head, rest)) = line.split_once(before) else { continue };
+        let Some(inner) = rest.strip_suffix(after) else { continue };
+        let mut depth = 0;
+        let is_one_pair = inner.chars().all(|c| {
+            depth += i32::from(c == '(') - i32::from(c == ')');
+            depth >= 0
+        });
+        if is_one_pair {
+            return format!("{head}{}{inner}{}", before.replacen('(', "", 1), after.replacen(')', "", 1));
+        }
+    }
+    line.to_owned()
 }
 
 /// The name a declaration declares: after `struct`, before the parameters of a function, before the `=` of a
@@ -107,6 +124,19 @@ mod tests {
             const float HALF = max(0.5, 0.25);\nret_of of(\n    Pair p\n) {\n    if (true) {\n    }\n}\n";
         let names: Vec<_> = split(text).unwrap().into_iter().map(|chunk| chunk.name).collect();
         assert_eq!(names, ["Pair", "ret_of", "HALF", "of"]);
+    }
+
+    #[test]
+    fn only_parentheses_around_everything_go() {
+        for (line, wanted) in [
+            ("return (a * (b + c));", "return a * (b + c);"),
+            ("float x = ((a) + (b));", "float x = (a) + (b);"),
+            ("if ((a == b)) {", "if (a == b) {"),
+            ("return (a) * (b);", "return (a) * (b);"),
+            ("if ((a) || (b)) {", "if ((a) || (b)) {"),
+        ] {
+            assert_eq!(without_parentheses(line), wanted);
+        }
     }
 
     #[test]
