@@ -49,7 +49,10 @@ fn anisotropy(scene: &Scene, material: &Material, sense: f32) -> Option<SurfaceT
             };
             let texels = (0..image.width * image.height).map(texel).collect();
             let level = MipLevel { width: image.width, height: image.height, texels };
-            BoundTexture::new(Arc::new(MipTexture { levels: vec![level], wrap: place.wrap, encoded: None }), place)
+            BoundTexture::new(
+                Arc::new(MipTexture { levels: vec![level], wrap: place.wrap, encoded: None }),
+                place,
+            )
         }
     };
     Some(SurfaceTextures { normal: BoundTexture::constant([0.5, 0.5, 0.0, 1.0]), aniso })

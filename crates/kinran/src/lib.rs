@@ -14,10 +14,13 @@ mod outputs;
 pub mod picture;
 mod progress;
 pub mod render;
+pub mod shaders;
 pub mod surfaces;
 mod table;
 mod values;
 pub mod view;
+#[cfg(feature = "view")]
+pub mod viewer;
 
 pub use console::Console;
 pub use error::Error;

@@ -3,7 +3,9 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use kinran::{Console, Error, bake, compare, demo, inspect, render};
+#[cfg(feature = "view")]
+use kinran::viewer;
+use kinran::{Console, Error, bake, compare, demo, inspect, render, shaders};
 
 /// Anisotropic materials from authored maps to pictures.
 #[derive(Parser)]
@@ -14,6 +16,7 @@ use kinran::{Console, Error, bake, compare, demo, inspect, render};
   kinran render model.glb -o model.png
   kinran compare model.glb -o comparison/
   kinran inspect model_normal.ktx2
+  kinran shaders --lang hlsl -o shaders/
 
 Angles are degrees. `kinran help COMMAND` tells all about a command.
 Exit codes: 0 done, 2 something in the input or the flags is wrong, 1 a defect of the program.")]
@@ -41,6 +44,9 @@ enum Command {
     Render(render::Args),
     Compare(compare::Args),
     Inspect(inspect::Args),
+    Shaders(shaders::Args),
+    #[cfg(feature = "view")]
+    View(Box<viewer::Args>),
 }
 
 fn main() -> ExitCode {
@@ -62,6 +68,9 @@ fn run(command: &Command, console: &Console) -> Result<(), Error> {
         Command::Render(args) => render::run(args, console),
         Command::Compare(args) => compare::run(args, console),
         Command::Inspect(args) => inspect::run(args, console),
+        #[cfg(feature = "view")]
+        Command::View(args) => viewer::run(args, console),
+        Command::Shaders(args) => shaders::run(args, console),
     }
 }
 

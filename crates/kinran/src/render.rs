@@ -99,7 +99,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     outputs::check_file(&args.output, &["png", "exr"])?;
     if args.backend == Backend::Gpu && cfg!(not(feature = "gpu")) {
         let fix = "build it with `cargo build --release -p kinran --features gpu`, or use --backend cpu";
-        return Err(Error::Usage(format!("--backend gpu: this kinran was built without a GPU renderer; {fix}")));
+        return Err(Error::Usage(format!(
+            "--backend gpu: this kinran was built without a GPU renderer; {fix}"
+        )));
     }
     let scene = Scene::load(&args.file)?;
     let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
@@ -152,7 +154,7 @@ fn gpu_film(view: &View, scene: &RenderScene, args: &Args, progress: &Progress) 
     let source = ShaderSource { folder: args.shaders.clone() };
     // Nothing is shown on a display, so any format will do.
     let renderer = Realtime::new(&gpu, &source, wgpu::TextureFormat::Rgba8Unorm)?;
-    let scene = renderer.load(scene);
+    let scene = renderer.load(scene, &renderer.light_of(scene));
     let settings = Settings { shadows: view.shadows, background: view.background, ..Settings::default() };
     let stage = progress.stage("render", u64::from(args.spp));
     Ok(renderer.film(&scene, &view.camera, &settings, view.size, args.spp, &|_, _| stage.add(1))?)

@@ -185,12 +185,7 @@ impl View {
                 Error::Usage(format!("{file}: --camera {n}: the file has {count} cameras; {fix}"))
             })?,
         };
-        let environment = match &args.env {
-            EnvironmentChoice::Studio => Some(Environment::studio()),
-            EnvironmentChoice::None => None,
-            EnvironmentChoice::File(path) => Some(Environment::load(path)?),
-        };
-        let environment = environment.map(|e| turned(e, args.env_rotation));
+        let environment = environment(&args.env, args.env_rotation)?;
         let from_file = matches!(args.env, EnvironmentChoice::File(_));
         let default_background =
             if from_file { Background::Environment { blur: 0.0 } } else { Background::Color(BACKDROP) };
@@ -320,6 +315,19 @@ fn lights(scene: &Scene, args: &ViewArgs, camera: &Camera) -> Vec<Light> {
     } else {
         scene.lights.clone()
     }
+}
+
+/// The environment chosen, turned by so many degrees.
+///
+/// # Errors
+/// Those of [`Environment::load`].
+pub(crate) fn environment(choice: &EnvironmentChoice, rotation: f32) -> Result<Option<Environment>, Error> {
+    let environment = match choice {
+        EnvironmentChoice::Studio => Some(Environment::studio()),
+        EnvironmentChoice::None => None,
+        EnvironmentChoice::File(path) => Some(Environment::load(path)?),
+    };
+    Ok(environment.map(|e| turned(e, rotation)))
 }
 
 fn turned(environment: Environment, degrees: f32) -> Environment {

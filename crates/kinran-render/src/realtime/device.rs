@@ -40,8 +40,9 @@ impl Gpu {
             required_limits: adapter.limits(),
             ..Default::default()
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|e| Error::Gpu(format!("the Vulkan device {} cannot be used: {e}", adapter.get_info().name)))?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| {
+            Error::Gpu(format!("the Vulkan device {} cannot be used: {e}", adapter.get_info().name))
+        })?;
         Ok(Self { device, queue })
     }
 }

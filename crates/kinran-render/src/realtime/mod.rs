@@ -15,15 +15,15 @@ use glam::camera::rh;
 use glam::{Mat4, Vec2, Vec3, Vec4};
 use kinran_scene::{Camera, LightKind};
 
+use crate::Error;
 use crate::reference::sampler::sample_2d;
 use crate::reference::{Background, Film, RenderScene};
 use crate::tonemap::Tonemap;
-use crate::Error;
 
 pub use device::{Gpu, wanted_features};
 pub use shaders::ShaderSource;
 pub use target::Target;
-pub use upload::GpuScene;
+pub use upload::{Adjustment, GpuLight, GpuScene};
 use upload::{Path, VERTEX_FLOATS};
 
 /// Lights that a frame may have.
@@ -183,9 +183,15 @@ impl Realtime {
         Ok(())
     }
 
-    /// Brings a scene to the device. Filtering its environment takes a second or so.
-    pub fn load(&self, scene: &RenderScene) -> GpuScene {
-        GpuScene::new(&self.gpu, &self.layouts, scene)
+    /// Brings light from all around to the device and filters it, which takes a second or so.
+    pub fn light_of(&self, scene: &RenderScene) -> GpuLight {
+        GpuLight::new(&self.gpu, scene.surroundings.as_deref())
+    }
+
+    /// Brings a scene to the device, lit by what [`Realtime::light_of`] made of it or of another with the same
+    /// surroundings.
+    pub fn load(&self, scene: &RenderScene, light: &GpuLight) -> GpuScene {
+        GpuScene::new(&self.gpu, &self.layouts, scene, light)
     }
 
     /// Adds a frame to `target`. Frames differ in where in the pixel they look.
@@ -280,7 +286,11 @@ impl Realtime {
         let refuse = |name, value: u32, fix| Err(Error::Setting { name, value: value.to_string(), fix });
         for (name, side) in [("width", size.0), ("height", size.1)] {
             if !(1..=largest).contains(&side) {
-                return refuse(name, side, "it must be at least 1 and at most what the GPU draws, 8192 or more");
+                return refuse(
+                    name,
+                    side,
+                    "it must be at least 1 and at most what the GPU draws, 8192 or more",
+                );
             }
         }
         if samples == 0 {
@@ -312,8 +322,10 @@ impl Realtime {
         let far = (eye.distance(middle) + radius) * 1.01;
         let near = ((eye.distance(middle) - radius) * 0.99).max(far * 1e-4);
         // The place in the pixel that this frame looks at becomes its centre.
-        let shift = Vec3::new(1.0 - 2.0 * jitter.x, 2.0 * jitter.y - 1.0, 0.0) / Vec3::new(width, height, 1.0);
-        let projection = Mat4::from_translation(shift) * rh::proj::directx::perspective(camera.yfov, width / height, near, far);
+        let shift =
+            Vec3::new(1.0 - 2.0 * jitter.x, 2.0 * jitter.y - 1.0, 0.0) / Vec3::new(width, height, 1.0);
+        let projection = Mat4::from_translation(shift)
+            * rh::proj::directx::perspective(camera.yfov, width / height, near, far);
         let view_projection = projection * Mat4::from(camera.transform).inverse();
 
         // The shadow map sees the whole model.
@@ -350,7 +362,9 @@ impl Realtime {
         for light in lights {
             let (kind, inner, outer) = match light.kind {
                 LightKind::Directional => (0.0, 0.0, 0.0),
-                LightKind::Spot { inner_cone_angle, outer_cone_angle } => (2.0, inner_cone_angle, outer_cone_angle),
+                LightKind::Spot { inner_cone_angle, outer_cone_angle } => {
+                    (2.0, inner_cone_angle, outer_cone_angle)
+                }
                 _ => (1.0, 0.0, 0.0),
             };
             let shadowed = sun.is_some_and(|sun| std::ptr::eq(sun, light));
@@ -366,27 +380,39 @@ impl Realtime {
 
     fn group(&self, layout: &wgpu::BindGroupLayout, views: &[&wgpu::TextureView]) -> wgpu::BindGroup {
         let resources = views.iter().map(|view| wgpu::BindingResource::TextureView(view));
-        let entries: Vec<_> =
-            (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
-        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+        let entries: Vec<_> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout,
+            entries: &entries,
+        })
     }
 
     fn frame_group(&self, scene: &GpuScene) -> wgpu::BindGroup {
         use wgpu::BindingResource::{Sampler, TextureView};
         let resources = [
             self.frame.as_entire_binding(),
-            TextureView(&scene.environment),
-            TextureView(&scene.probe),
+            TextureView(&scene.light.environment),
+            TextureView(&scene.light.probe),
             TextureView(&self.albedo),
             TextureView(&self.shadow_map),
             Sampler(&self.around),
             Sampler(&self.clamp),
             Sampler(&self.compare),
         ];
-        let entries: Vec<_> =
-            (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+        let entries: Vec<_> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
         let layout = &self.layouts.frame;
-        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+        self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout,
+            entries: &entries,
+        })
     }
 
     fn draw_shadows(&self, encoder: &mut wgpu::CommandEncoder, scene: &GpuScene) {
@@ -491,9 +517,11 @@ impl Layouts {
                 count: None,
             };
             let entries: Vec<_> = types.iter().enumerate().map(entry).collect();
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
+            device
+                .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
         };
-        let (filtered, raw) = (texture(T::Float { filterable: true }), texture(T::Float { filterable: false }));
+        let (filtered, raw) =
+            (texture(T::Float { filterable: true }), texture(T::Float { filterable: false }));
         let smooth = BindingType::Sampler(S::Filtering);
         let mut material = vec![uniform];
         material.extend([filtered; 6]);
@@ -653,7 +681,11 @@ impl Pipelines {
     }
 }
 
-fn pipeline(device: &wgpu::Device, source: &ShaderSource, pass: &Pass) -> Result<wgpu::RenderPipeline, Error> {
+fn pipeline(
+    device: &wgpu::Device,
+    source: &ShaderSource,
+    pass: &Pass,
+) -> Result<wgpu::RenderPipeline, Error> {
     let text = source.pass(pass.files)?;
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: None,
@@ -665,8 +697,7 @@ fn pipeline(device: &wgpu::Device, source: &ShaderSource, pass: &Pass) -> Result
         bind_group_layouts: &groups,
         immediate_size: 0,
     });
-    let attributes =
-        wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x4, 4 => Float32x4];
+    let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x4, 4 => Float32x4];
     let buffers = [Some(wgpu::VertexBufferLayout {
         array_stride: VERTEX_FLOATS as u64 * 4,
         step_mode: wgpu::VertexStepMode::Vertex,

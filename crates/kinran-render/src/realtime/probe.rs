@@ -2,9 +2,7 @@
 
 use glam::{Mat3, Vec2, Vec3, vec2};
 use kinran_scene::Environment;
-use kinran_shading::{
-    alpha_from_roughness, ggx_aniso_d, ggx_vndf_pdf, ggx_vndf_sample, m_n, smith_aniso_v,
-};
+use kinran_shading::{alpha_from_roughness, ggx_aniso_d, ggx_vndf_pdf, ggx_vndf_sample, m_n, smith_aniso_v};
 use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
 
@@ -29,7 +27,11 @@ pub(super) fn prefilter(environment: &Environment) -> Vec<Vec<Vec3>> {
             let texel = |i: usize| {
                 let place = vec2((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
                 let direction = direction(place / vec2(width as f32, height as f32));
-                if level == 0 { environment.radiance(direction) } else { filtered(environment, direction, alpha) }
+                if level == 0 {
+                    environment.radiance(direction)
+                } else {
+                    filtered(environment, direction, alpha)
+                }
             };
             (0..width * height).into_par_iter().map(texel).collect()
         })
@@ -47,7 +49,8 @@ fn direction(uv: Vec2) -> Vec3 {
 /// the balance heuristic. Numerator and denominator share their samples.
 fn filtered(environment: &Environment, axis: Vec3, alpha: f32) -> Vec3 {
     // m_n is worst at -z; a frame for the opposite hemisphere is its mirror image.
-    let to_world = if axis.z >= 0.0 { m_n(axis) } else { m_n(-axis) * Mat3::from_diagonal(Vec3::new(1.0, -1.0, -1.0)) };
+    let to_world =
+        if axis.z >= 0.0 { m_n(axis) } else { m_n(-axis) * Mat3::from_diagonal(Vec3::new(1.0, -1.0, -1.0)) };
     let to_lobe = to_world.transpose();
     let v = Vec3::Z;
     let mut radiance = Vec3::ZERO;

@@ -43,7 +43,8 @@ impl ShaderSource {
 
     fn file(&self, name: &str) -> Result<String, Error> {
         let built_in = Self::files().find(|(file, _)| *file == name).map_or("", |(_, text)| text);
-        let Some(path) = self.folder.as_ref().map(|folder| folder.join(name)).filter(|path| path.exists()) else {
+        let Some(path) = self.folder.as_ref().map(|folder| folder.join(name)).filter(|path| path.exists())
+        else {
             return Ok(built_in.to_owned());
         };
         std::fs::read_to_string(&path).map_err(|e| Error::Shader(format!("{}: {e}", path.display())))

@@ -9,6 +9,8 @@ struct Material {
     // x 1: normals and roughness from the surface textures, y alpha mode: 0 opaque, 1 mask, 2 blend,
     // z 1: double sided.
     flags: vec4u,
+    // x roughness, y anisotropy, z rotation, w normal scale: turned by hand, see Adjustment.
+    adjustment: vec4f,
     // Rows of the six textures' transforms; w of the first row is the UV set.
     transforms: array<vec4f, 12>,
 }
@@ -69,12 +71,13 @@ fn surface_at(in: Varying, front: bool) -> Surface {
     let occlusion = textureSample(occlusion_map, occlusion_sampler, uv(in, 4u)).r;
     let emissive = textureSample(emissive_map, emissive_sampler, uv(in, 5u)).rgb;
     let normal_xy = textureSample(normal_map, normal_sampler, uv(in, 0u)).rg * 2.0 - 1.0;
+    let tilted = normal_xy * material.adjustment.w;
     let texel = textureSample(aniso_map, aniso_sampler, uv(in, 1u)).rgb;
 
     // Normal and roughness in the tangent frame of the mesh, which is not normalised: MikkTSpace.
     let alpha = alpha_from_roughness(saturate(material.factors.y * metallic_roughness.g));
     let mapped = material.flags.x == 1u;
-    let n = select(vec3f(0.0, 0.0, 1.0), normal_from_xy(normal_xy.x, normal_xy.y), mapped);
+    let n = select(vec3f(0.0, 0.0, 1.0), normal_from_xy(tilted.x, tilted.y), mapped);
     let encoded = select(vec3f(alpha, 0.5, alpha), texel, mapped);
 
     // To world space. Back faces are the same relief seen from behind.
@@ -95,10 +98,14 @@ fn surface_at(in: Varying, front: bool) -> Surface {
     surface.position = in.position;
     surface.geometric_normal = normalize(in.normal) * side;
     surface.normal = normal;
-    surface.tangent = aniso.tangent;
-    surface.bitangent = aniso.bitangent;
-    surface.alpha_t = aniso.alpha_t;
-    surface.alpha_b = aniso.alpha_b;
+    let c = cos(material.adjustment.z);
+    let s = sin(material.adjustment.z);
+    surface.tangent = c * aniso.tangent + s * aniso.bitangent;
+    surface.bitangent = c * aniso.bitangent - s * aniso.tangent;
+    let mean = sqrt(aniso.alpha_t * aniso.alpha_b) * material.adjustment.x;
+    let stretch = pow(aniso.alpha_t / aniso.alpha_b, 0.5 * material.adjustment.y);
+    surface.alpha_t = clamp(mean * stretch, ALPHA_MIN, 1.0);
+    surface.alpha_b = clamp(mean / stretch, ALPHA_MIN, 1.0);
     surface.base_color = base.rgb;
     surface.metallic = saturate(material.factors.x * metallic_roughness.b);
     surface.transmissive = material.factors.w;

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use glam::{Mat3, Vec3};
 use half::f16;
 use kinran_image::{Format, Texture, Transfer};
-use kinran_scene::{AlphaMode, Wrap};
+use kinran_scene::{AlphaMode, Light, Wrap};
 use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
 
 use super::{Gpu, Layouts, probe};
-use crate::reference::{BoundTexture, MipTexture, RenderMaterial, RenderScene};
+use crate::reference::{BoundTexture, MipTexture, RenderMaterial, RenderScene, Surroundings};
 
 /// Floats of a vertex: position, normal, tangent, both UV sets, colour.
 pub(super) const VERTEX_FLOATS: usize = 3 + 3 + 4 + 4 + 4;
@@ -32,9 +32,30 @@ pub(super) struct Draw {
 }
 
 pub(super) struct Material {
+    uniform: wgpu::Buffer,
     pub(super) bind_group: wgpu::BindGroup,
     pub(super) path: Path,
     pub(super) double_sided: bool,
+}
+
+/// What a person may turn of a material whose roughness and normals are baked, without baking again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adjustment {
+    /// Multiplies both alphas.
+    pub roughness: f32,
+    /// Exponent of the ratio of the two alphas; their product stays. 0 is round, 1 as baked.
+    pub anisotropy: f32,
+    /// Turns the direction of the larger alpha, radians, counter-clockwise about the normal.
+    pub rotation: f32,
+    /// Multiplies x and y of the normal map.
+    pub normal_scale: f32,
+}
+
+impl Default for Adjustment {
+    /// As baked.
+    fn default() -> Self {
+        Self { roughness: 1.0, anisotropy: 1.0, rotation: 0.0, normal_scale: 1.0 }
+    }
 }
 
 /// All that is drawn.
@@ -43,8 +64,7 @@ pub struct GpuScene {
     pub(super) indices: wgpu::Buffer,
     pub(super) draws: Vec<Draw>,
     pub(super) materials: Vec<Material>,
-    pub(super) environment: wgpu::TextureView,
-    pub(super) probe: wgpu::TextureView,
+    pub(super) light: GpuLight,
     pub(super) scene: RenderScene,
 }
 
@@ -54,7 +74,29 @@ pub(super) fn bytes(floats: &[f32]) -> Vec<u8> {
 }
 
 impl GpuScene {
-    pub(super) fn new(gpu: &Gpu, layouts: &Layouts, scene: &RenderScene) -> Self {
+    /// What is drawn, as it was given.
+    pub fn scene(&self) -> &RenderScene {
+        &self.scene
+    }
+
+    /// Other lights from the next frame on.
+    pub fn set_lights(&mut self, lights: Vec<Light>) {
+        self.scene.lights = lights;
+    }
+
+    /// Other factors for a material from the next frame on; its textures stay, as does the pass that draws it.
+    pub fn set_material(
+        &mut self,
+        gpu: &Gpu,
+        index: usize,
+        material: &RenderMaterial,
+        adjustment: Adjustment,
+    ) {
+        let floats = material_floats(material, adjustment);
+        gpu.queue.write_buffer(&self.materials[index].uniform, 0, &bytes(&floats));
+    }
+
+    pub(super) fn new(gpu: &Gpu, layouts: &Layouts, scene: &RenderScene, light: &GpuLight) -> Self {
         let buffer = |contents: &[u8], usage| {
             gpu.device.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })
         };
@@ -71,9 +113,10 @@ impl GpuScene {
         }
         let indices: Vec<u8> = geometry.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
         let mut draws: Vec<Draw> = Vec::new();
-        for run in (0..geometry.triangles.len()).collect::<Vec<_>>().chunk_by(|&a, &b| {
-            geometry.materials[a] == geometry.materials[b]
-        }) {
+        for run in (0..geometry.triangles.len())
+            .collect::<Vec<_>>()
+            .chunk_by(|&a, &b| geometry.materials[a] == geometry.materials[b])
+        {
             let corners = run.iter().flat_map(|&t| geometry.triangles[t]);
             let sum: Vec3 = corners.map(|i| geometry.positions[i as usize]).sum();
             draws.push(Draw {
@@ -85,32 +128,41 @@ impl GpuScene {
 
         let mut textures = Textures { gpu, views: HashMap::new(), samplers: HashMap::new() };
         let materials = scene.materials.iter().map(|m| material(&mut textures, layouts, m)).collect();
-        let (environment, probe) = surroundings(gpu, scene);
         Self {
             vertices: buffer(&bytes(&vertices), wgpu::BufferUsages::VERTEX),
             indices: buffer(&indices, wgpu::BufferUsages::INDEX),
             draws,
             materials,
-            environment,
-            probe,
+            light: light.clone(),
             scene: scene.clone(),
         }
     }
 }
 
-/// The environment as it is, and filtered.
-fn surroundings(gpu: &Gpu, scene: &RenderScene) -> (wgpu::TextureView, wgpu::TextureView) {
-    let black = vec![vec![Vec3::ZERO]];
-    let Some(surroundings) = &scene.surroundings else {
-        let view = float_texture(gpu, (1, 1), &half_levels(&black));
-        return (view.clone(), view);
-    };
-    let environment = &surroundings.environment;
-    let (width, height) = (environment.width(), environment.height());
-    let texels = (0..height).flat_map(|y| (0..width).map(move |x| environment.texel(x, y))).collect();
-    let seen = float_texture(gpu, (width as u32, height as u32), &half_levels(&[texels]));
-    let levels = probe::prefilter(environment);
-    (seen, float_texture(gpu, (2 * probe::HEIGHT as u32, probe::HEIGHT as u32), &half_levels(&levels)))
+/// Light from all around on the GPU; cloning shares it.
+#[derive(Clone)]
+pub struct GpuLight {
+    /// As it is.
+    pub(super) environment: wgpu::TextureView,
+    /// In lobes.
+    pub(super) probe: wgpu::TextureView,
+}
+
+impl GpuLight {
+    pub(super) fn new(gpu: &Gpu, surroundings: Option<&Surroundings>) -> Self {
+        let Some(surroundings) = surroundings else {
+            let environment = float_texture(gpu, (1, 1), &half_levels(&[vec![Vec3::ZERO]]));
+            return Self { probe: environment.clone(), environment };
+        };
+        let environment = &surroundings.environment;
+        let (width, height) = (environment.width(), environment.height());
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| environment.texel(x, y))).collect();
+        let size = (2 * probe::HEIGHT as u32, probe::HEIGHT as u32);
+        Self {
+            environment: float_texture(gpu, (width as u32, height as u32), &half_levels(&[texels])),
+            probe: float_texture(gpu, size, &half_levels(&probe::prefilter(environment))),
+        }
+    }
 }
 
 fn half_levels(levels: &[Vec<Vec3>]) -> Vec<Vec<u8>> {
@@ -140,7 +192,8 @@ fn create_texture(
         view_formats: &[],
     };
     let data: Vec<u8> = levels.iter().flat_map(|level| level.as_ref()).copied().collect();
-    let texture = gpu.device.create_texture_with_data(&gpu.queue, &descriptor, TextureDataOrder::MipMajor, &data);
+    let texture =
+        gpu.device.create_texture_with_data(&gpu.queue, &descriptor, TextureDataOrder::MipMajor, &data);
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
@@ -169,8 +222,11 @@ impl Textures<'_> {
         let upload = || {
             encoded(gpu, texture).unwrap_or_else(|| {
                 let texel = |t: &[f32; 4]| t.map(half).into_iter().flatten();
-                let levels: Vec<Vec<u8>> =
-                    texture.levels.iter().map(|level| level.texels.iter().flat_map(texel).collect()).collect();
+                let levels: Vec<Vec<u8>> = texture
+                    .levels
+                    .iter()
+                    .map(|level| level.texels.iter().flat_map(texel).collect())
+                    .collect();
                 float_texture(gpu, (texture.levels[0].width, texture.levels[0].height), &levels)
             })
         };
@@ -223,19 +279,20 @@ fn encoded(gpu: &Gpu, texture: &MipTexture) -> Option<wgpu::TextureView> {
     (readable && whole).then(|| create_texture(gpu, (width, height), format, &levels))
 }
 
-fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> Material {
-    let white = BoundTexture::constant([1.0; 4]);
-    let surface = m.surface.as_ref();
-    let slots = [
-        surface.map_or(&white, |s| &s.normal),
-        surface.map_or(&white, |s| &s.aniso),
-        m.base_color.as_ref().unwrap_or(&white),
-        m.metallic_roughness.as_ref().unwrap_or(&white),
-        m.occlusion.as_ref().unwrap_or(&white),
-        m.emissive.as_ref().unwrap_or(&white),
-    ];
+/// The six textures of a material, `white` where it has none.
+fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTexture; 6] {
+    [
+        m.surface.as_ref().map_or(white, |s| &s.normal),
+        m.surface.as_ref().map_or(white, |s| &s.aniso),
+        m.base_color.as_ref().unwrap_or(white),
+        m.metallic_roughness.as_ref().unwrap_or(white),
+        m.occlusion.as_ref().unwrap_or(white),
+        m.emissive.as_ref().unwrap_or(white),
+    ]
+}
 
-    // The uniform, as surface.wgsl declares it.
+/// The uniform that surface.wgsl declares.
+fn material_floats(m: &RenderMaterial, adjustment: Adjustment) -> Vec<f32> {
     let (mode, cutoff) = match m.alpha_mode {
         AlphaMode::Opaque => (0, 0.0),
         AlphaMode::Mask { cutoff } => (1, cutoff),
@@ -245,12 +302,21 @@ fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> M
     floats.extend(m.emissive_factor.extend(m.occlusion_strength).to_array());
     let transmissive = f32::from(u8::from(m.transmissive));
     floats.extend([m.metallic_factor, m.roughness_factor, cutoff, transmissive]);
-    floats.extend([u32::from(surface.is_some()), mode, 0, 0].map(f32::from_bits));
-    for slot in slots {
+    floats.extend([u32::from(m.surface.is_some()), mode, 0, 0].map(f32::from_bits));
+    let Adjustment { roughness, anisotropy, rotation, normal_scale } = adjustment;
+    floats.extend([roughness, anisotropy, rotation, normal_scale]);
+    for slot in slots(m, &BoundTexture::constant([1.0; 4])) {
         let Mat3 { x_axis, y_axis, z_axis } = slot.transform;
         floats.extend([x_axis.x, y_axis.x, z_axis.x, slot.uv_set as f32]);
         floats.extend([x_axis.y, y_axis.y, z_axis.y, 0.0]);
     }
+    floats
+}
+
+fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> Material {
+    let white = BoundTexture::constant([1.0; 4]);
+    let slots = slots(m, &white);
+    let floats = material_floats(m, Adjustment::default());
     let uniform = textures.gpu.device.create_buffer_init(&BufferInitDescriptor {
         label: None,
         contents: &bytes(&floats),
@@ -272,10 +338,10 @@ fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> M
     });
     let path = if m.alpha_mode == AlphaMode::Blend || m.transmissive {
         Path::Blended
-    } else if surface.is_some() {
+    } else if m.surface.is_some() {
         Path::Forward
     } else {
         Path::Deferred
     };
-    Material { bind_group, path, double_sided: m.double_sided }
+    Material { uniform, bind_group, path, double_sided: m.double_sided }
 }

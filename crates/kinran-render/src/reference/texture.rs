@@ -345,7 +345,8 @@ mod tests {
             height: size,
             texels: vec![[value; 4]; (size * size) as usize],
         };
-        let texture = MipTexture { levels: vec![level(2, 0.0), level(1, 1.0)], wrap: [Wrap::Repeat; 2], encoded: None };
+        let texture =
+            MipTexture { levels: vec![level(2, 0.0), level(1, 1.0)], wrap: [Wrap::Repeat; 2], encoded: None };
         for (lod, wanted) in [(-3.0, 0.0), (0.0, 0.0), (0.25, 0.25), (1.0, 1.0), (9.0, 1.0)] {
             assert_eq!(texture.sample_lod(vec2(0.1, 0.9), lod).x, wanted, "lod {lod}");
         }

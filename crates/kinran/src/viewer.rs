@@ -1,0 +1,107 @@
+//! `kinran view`: a window with every parameter on a slider.
+
+mod app;
+mod loader;
+mod orbit;
+mod panel;
+mod parameters;
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+
+use eframe::egui;
+use kinran_render::realtime::wanted_features;
+
+use crate::view::ViewArgs;
+use crate::{Console, Error};
+use app::App;
+use parameters::Parameters;
+
+/// Opens a window on a glTF file
+///
+/// Drag turns the model, the right button moves it, the wheel brings it nearer; ? lists the keys. The picture is drawn by
+/// the GPU and gets smoother while nothing moves. Filters are baked in the background. A file dropped on the window takes
+/// the place of the one that is shown.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  kinran view lamp.glb
+  kinran view lamp.glb --env studio.hdr --light 1,2,1
+  kinran view lamp.glb --parameters lamp.kinran.json
+  kinran view lamp.glb --shaders my_shaders/     edit a shader there, and see it at once")]
+pub struct Args {
+    /// The .glb or .gltf file, or a folder that holds one, such as `kinran bake` writes; may also be dropped later
+    #[arg(value_name = "FILE")]
+    pub file: Option<PathBuf>,
+
+    /// What the sliders say, as the window saves it
+    #[arg(long, value_name = "JSON")]
+    pub parameters: Option<PathBuf>,
+
+    /// A folder of the renderer's shaders: it is made and filled if it is not there, and whatever is saved in it takes
+    /// effect at once
+    #[arg(long, value_name = "DIR")]
+    pub shaders: Option<PathBuf>,
+
+    /// Saves a picture of the window as .png once it is drawn smoothly, then closes it
+    #[arg(long, value_name = "PNG")]
+    pub screenshot: Option<PathBuf>,
+
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub view: ViewArgs,
+}
+
+/// The command; returns when the window is closed.
+///
+/// # Errors
+/// [`Error::Usage`] where no window can be opened; those of the files named.
+pub fn run(args: &Args, _: &Console) -> Result<(), Error> {
+    if let Some(path) = &args.screenshot {
+        crate::outputs::check_file(path, &["png"])?;
+    }
+    let file = args.file.as_deref().map(loader::model_in).transpose()?;
+    let parameters = match &args.parameters {
+        Some(path) => Parameters::load(path)?,
+        None => Parameters::from_args(&args.view),
+    };
+    if let Some(folder) = &args.shaders {
+        loader::fill_shader_folder(folder)?;
+    }
+
+    let mut options = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default().with_inner_size([1280.0, 800.0]).with_title("Kinran"),
+        renderer: eframe::Renderer::Wgpu,
+        ..Default::default()
+    };
+    if let eframe::egui_wgpu::WgpuSetup::CreateNew(setup) = &mut options.wgpu_options.wgpu_setup {
+        setup.device_descriptor = Arc::new(|adapter| wgpu::DeviceDescriptor {
+            label: Some("kinran"),
+            required_features: wanted_features(adapter),
+            required_limits: adapter.limits(),
+            ..Default::default()
+        });
+    }
+    // What goes wrong inside comes out here, since the window's loop returns only its own errors.
+    let failure = Arc::new(Mutex::new(None));
+    let inside = failure.clone();
+    let settings = app::Start {
+        file,
+        view: args.view.clone(),
+        parameters,
+        shaders: args.shaders.clone(),
+        screenshot: args.screenshot.clone(),
+    };
+    let created = eframe::run_native(
+        "kinran",
+        options,
+        Box::new(move |context| Ok(Box::new(App::new(context, settings, inside)?))),
+    );
+    if let Some(error) = failure.lock().ok().and_then(|mut failure| failure.take()) {
+        return Err(error);
+    }
+    created.map_err(|e| {
+        let fix = "a window needs a display and a Vulkan driver (in Debian, mesa-vulkan-drivers); without them use \
+                   `kinran render`";
+        Error::Usage(format!("no window can be opened: {e}; {fix}"))
+    })
+}

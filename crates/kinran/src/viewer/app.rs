@@ -1,0 +1,642 @@
+//! The window: what happens in a frame.
+
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, RwLock};
+use std::time::{Duration, Instant, SystemTime};
+
+use eframe::egui::{self, Color32, Key, Rect, Sense, pos2, vec2};
+use glam::Vec3;
+use kinran_render::realtime::{Gpu, GpuScene, Realtime, Settings, ShaderSource, Target};
+use kinran_render::reference::{Background, Film};
+use kinran_render::tonemap::to_srgb8;
+use kinran_scene::Light;
+
+use super::loader::{self, Event, Job, Loader, Opened};
+use super::orbit::Orbit;
+use super::panel::{KEYS, Shown, Wishes, panel};
+use super::parameters::{CHANNELS, METHODS, MaterialParameters, Parameters};
+use crate::Error;
+use crate::render::write_rgb8;
+use crate::surfaces::Mips;
+use crate::view::{EnvironmentChoice, ViewArgs};
+
+/// Frames after which a still picture is smooth; chosen by eye.
+const FRAMES: u32 = 64;
+
+/// How often the shader folder is looked at.
+const SHADER_INTERVAL: Duration = Duration::from_millis(300);
+
+/// Radiance behind models; as pictures of `kinran render` have it.
+const BACKDROP: Vec3 = Vec3::new(0.085, 0.087, 0.092);
+
+/// What a window starts with.
+pub(super) struct Start {
+    pub(super) file: Option<PathBuf>,
+    pub(super) view: ViewArgs,
+    pub(super) parameters: Parameters,
+    pub(super) shaders: Option<PathBuf>,
+    pub(super) screenshot: Option<PathBuf>,
+}
+
+/// One side of the split line.
+struct Side {
+    target: Target,
+    view: wgpu::TextureView,
+    id: egui::TextureId,
+    /// What was drawn last.
+    mips: Option<Mips>,
+}
+
+/// The model that is shown.
+struct Model {
+    opened: Opened,
+    /// As authored, for the sliders' reset.
+    authored: Vec<MaterialParameters>,
+    scenes: HashMap<Mips, GpuScene>,
+    asked: HashSet<Mips>,
+    mapped: Vec<bool>,
+}
+
+/// The window.
+pub(super) struct App {
+    gpu: Gpu,
+    display: eframe::egui_wgpu::RenderState,
+    renderer: Arc<RwLock<Realtime>>,
+    loader: Loader,
+    args: ViewArgs,
+    parameters: Parameters,
+    /// What the scenes were last told.
+    applied: Option<Parameters>,
+    material: usize,
+    model: Option<Model>,
+    sides: [Option<Side>; 2],
+    busy: String,
+    message: String,
+    shader_error: String,
+    shaders: ShaderSource,
+    shader_stamp: Option<SystemTime>,
+    shader_check: Instant,
+    help: bool,
+    screenshot: Option<PathBuf>,
+    closing: Arc<Mutex<bool>>,
+    failure: Arc<Mutex<Option<Error>>>,
+}
+
+impl App {
+    /// A window on the device that egui draws with.
+    pub(super) fn new(
+        context: &eframe::CreationContext,
+        start: Start,
+        failure: Arc<Mutex<Option<Error>>>,
+    ) -> Result<Self, Error> {
+        let display = context.wgpu_render_state.clone();
+        let display = display.ok_or_else(|| Error::Usage("the window has no GPU to draw with".into()))?;
+        let gpu = Gpu { device: display.device.clone(), queue: display.queue.clone() };
+        let shaders = ShaderSource { folder: start.shaders };
+        let format = wgpu::TextureFormat::Rgba8Unorm;
+        let mut shader_error = String::new();
+        // A folder may hold a mistake from the start; the built-in shaders draw until it is mended.
+        let renderer = match Realtime::new(&gpu, &shaders, format) {
+            Ok(renderer) => renderer,
+            Err(error) => {
+                shader_error = error.to_string();
+                Realtime::new(&gpu, &ShaderSource::default(), format)?
+            }
+        };
+        let renderer = Arc::new(RwLock::new(renderer));
+        let wake = context.egui_ctx.clone();
+        let loader = Loader::start(renderer.clone(), move || wake.request_repaint());
+        if let Some(file) = start.file {
+            loader.ask(Job::Open(file, args_with_light(&start.view, &start.parameters)));
+        }
+        Ok(Self {
+            gpu,
+            display,
+            renderer,
+            loader,
+            args: start.view,
+            parameters: start.parameters,
+            applied: None,
+            material: 0,
+            model: None,
+            sides: [None, None],
+            busy: String::new(),
+            message: String::new(),
+            shader_error,
+            shader_stamp: newest(&shaders),
+            shaders,
+            shader_check: Instant::now(),
+            help: false,
+            screenshot: start.screenshot,
+            closing: Arc::default(),
+            failure,
+        })
+    }
+
+    /// Takes what the loader has.
+    fn receive(&mut self) {
+        while let Some(event) = self.loader.event() {
+            match event {
+                Event::Busy(what) => self.busy = what,
+                Event::Failed(what) => {
+                    // A picture that cannot be taken any more must not keep a program waiting.
+                    if self.screenshot.is_some() {
+                        *self.failure.lock().expect("no thread panics") = Some(Error::Usage(what.clone()));
+                        *self.closing.lock().expect("no thread panics") = true;
+                    }
+                    self.message = what;
+                }
+                Event::Opened(opened) => self.open(*opened),
+                Event::LightChanged => {
+                    if let Some(model) = &mut self.model {
+                        model.asked.clear();
+                    }
+                }
+                Event::Baked(mips, scene) => {
+                    if let Some(model) = &mut self.model {
+                        model.mapped = scene.scene().materials.iter().map(|m| m.surface.is_some()).collect();
+                        model.scenes.insert(mips, *scene);
+                        self.applied = None;
+                        self.sides.iter_mut().flatten().for_each(|side| side.mips = None);
+                    }
+                }
+            }
+        }
+    }
+
+    fn open(&mut self, opened: Opened) {
+        let authored: Vec<_> = (opened.scene.materials.iter())
+            .map(|m| MaterialParameters {
+                base_color: m.base_color_factor.truncate().to_array(),
+                metallic: m.metallic_factor,
+                roughness: m.roughness_factor,
+                anisotropy: 1.0,
+                rotation: 0.0,
+                normal_scale: 1.0,
+                emissive: m.emissive_factor.to_array(),
+                occlusion: m.occlusion_strength,
+            })
+            .collect();
+        // Saved parameters belong to a model with as many materials.
+        if self.model.is_some() || self.parameters.materials.len() != authored.len() {
+            self.parameters.materials.clone_from(&authored);
+            self.parameters.orbit = None;
+        }
+        let middle = loader::middle(&opened.scene);
+        self.parameters.orbit.get_or_insert_with(|| Orbit::new(&opened.view.camera, middle));
+        self.message = opened.warnings.join("\n");
+        self.model = Some(Model {
+            mapped: vec![false; authored.len()],
+            opened,
+            authored,
+            scenes: HashMap::new(),
+            asked: HashSet::new(),
+        });
+        self.applied = None;
+    }
+
+    /// The methods to show, left and right, and asks for those that are not baked. Something is shown until they are.
+    fn methods(&mut self) -> [Option<Mips>; 2] {
+        let wanted = self.parameters.methods.map(|i| METHODS[i].1);
+        let Some(model) = &mut self.model else { return [None, None] };
+        // Level 0 needs no filter: it is there first.
+        let mut ask = vec![Mips::Level0, wanted[0]];
+        if self.parameters.split {
+            ask.push(wanted[1]);
+        }
+        for mips in ask {
+            if model.asked.insert(mips) {
+                self.loader.ask(Job::Bake(mips));
+            }
+        }
+        let there = |mips| if model.scenes.contains_key(&mips) { Some(mips) } else { None };
+        wanted.map(|mips| there(mips).or_else(|| there(Mips::Level0)))
+    }
+
+    /// Whether all that was asked for is shown, smoothly.
+    fn settled(&self) -> bool {
+        let wanted = self.parameters.methods.map(|i| METHODS[i].1);
+        let sides = if self.parameters.split { 2 } else { 1 };
+        self.busy.is_empty()
+            && (0..sides).all(|i| {
+                self.sides[i].as_ref().is_some_and(|s| s.mips == Some(wanted[i]) && s.target.frames >= FRAMES)
+            })
+    }
+
+    /// Tells the scenes what changed, and starts the pictures anew.
+    fn apply(&mut self) {
+        if self.applied.as_ref().is_some_and(|applied| same_picture(applied, &self.parameters)) {
+            return;
+        }
+        let p = &self.parameters;
+        if let Some(model) = &mut self.model {
+            let mut lights: Vec<Light> = Vec::new();
+            if p.sun.on {
+                lights.push(p.sun.light());
+            }
+            if p.own_lights {
+                lights.extend(&model.opened.view.lights);
+            }
+            for scene in model.scenes.values_mut() {
+                scene.set_lights(lights.clone());
+                for (i, m) in p.materials.iter().enumerate() {
+                    let mut material = scene.scene().materials[i].clone();
+                    let mapped = material.surface.is_some();
+                    material.base_color_factor =
+                        Vec3::from(m.base_color).extend(material.base_color_factor.w);
+                    material.metallic_factor = m.metallic;
+                    material.roughness_factor = m.roughness;
+                    material.emissive_factor = Vec3::from(m.emissive);
+                    material.occlusion_strength = m.occlusion;
+                    let authored = model.authored[i].roughness.max(1e-3);
+                    let relative = MaterialParameters { roughness: m.roughness / authored, ..m.clone() };
+                    scene.set_material(&self.gpu, i, &material, relative.adjustment(mapped));
+                }
+            }
+        }
+        self.applied = Some(p.clone());
+        self.clear();
+    }
+
+    fn clear(&mut self) {
+        let Ok(renderer) = self.renderer.read() else { return };
+        self.sides.iter_mut().flatten().for_each(|side| side.target.clear(&renderer));
+    }
+
+    fn settings(&self) -> Settings {
+        Settings {
+            shadows: self.parameters.shadows,
+            background: if self.parameters.background {
+                Background::Environment { blur: 0.0 }
+            } else {
+                Background::Color(BACKDROP)
+            },
+            channel: CHANNELS[self.parameters.channel].1,
+            exposure: self.parameters.exposure,
+            tonemap: self.parameters.curve(),
+            all_deferred: self.parameters.all_deferred,
+        }
+    }
+
+    /// Draws a frame of one side, unless it has enough of them.
+    fn draw(&mut self, index: usize, mips: Option<Mips>, size: (u32, u32)) {
+        let settings = self.settings();
+        let Ok(renderer) = self.renderer.read() else { return };
+        if self.sides[index].as_ref().is_none_or(|side| side.target.size != size) {
+            let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("picture"),
+                size: wgpu::Extent3d { width: size.0, height: size.1, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba8Unorm,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            });
+            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+            let mut display = self.display.renderer.write();
+            if let Some(old) = self.sides[index].take() {
+                display.free_texture(&old.id);
+            }
+            let id = display.register_native_texture(&self.gpu.device, &view, wgpu::FilterMode::Nearest);
+            self.sides[index] = Some(Side { target: Target::new(&renderer, size), view, id, mips: None });
+        }
+        let (Some(side), Some(orbit)) = (&mut self.sides[index], &self.parameters.orbit) else { return };
+        let scene = mips.zip(self.model.as_ref()).and_then(|(mips, model)| model.scenes.get(&mips));
+        let Some(scene) = scene else { return };
+        if side.mips != mips {
+            side.target.clear(&renderer);
+            side.mips = mips;
+        }
+        if side.target.frames < FRAMES {
+            renderer.draw(scene, &orbit.camera(), &settings, &mut side.target);
+            renderer.show(&side.target, &side.view, scene);
+        }
+    }
+
+    /// Compiles the shaders again when a file in their folder was saved, or when asked to.
+    fn reload(&mut self, asked: bool) {
+        if !asked && self.shader_check.elapsed() < SHADER_INTERVAL {
+            return;
+        }
+        self.shader_check = Instant::now();
+        let stamp = newest(&self.shaders);
+        if !asked && stamp == self.shader_stamp {
+            return;
+        }
+        // While the loader works the renderer is its; the next look comes soon.
+        let Ok(mut renderer) = self.renderer.try_write() else { return };
+        self.shader_stamp = stamp;
+        match renderer.reload_shaders(&self.shaders) {
+            Ok(()) => self.shader_error.clear(),
+            Err(error) => self.shader_error = error.to_string(),
+        }
+        drop(renderer);
+        self.clear();
+    }
+
+    fn keys(&mut self, ctx: &egui::Context) -> Wishes {
+        let mut wishes = Wishes::default();
+        // Letters that are typed into a field are not keys.
+        if ctx.egui_wants_keyboard_input() {
+            return wishes;
+        }
+        let (mut reload, p) = (false, &mut self.parameters);
+        ctx.input(|input| {
+            let command = input.modifiers.command;
+            wishes.save_parameters = command && input.key_pressed(Key::S);
+            if command {
+                return;
+            }
+            wishes.frame_model = input.key_pressed(Key::F);
+            wishes.save_picture = input.key_pressed(Key::P);
+            p.split ^= input.key_pressed(Key::C);
+            if input.key_pressed(Key::X) {
+                p.methods.swap(0, 1);
+            }
+            reload = input.key_pressed(Key::R);
+            self.help ^= input.key_pressed(Key::Questionmark);
+            self.help &= !input.key_pressed(Key::Escape);
+            p.exposure +=
+                if input.key_pressed(Key::Plus) || input.key_pressed(Key::Equals) { 1.0 / 3.0 } else { 0.0 };
+            p.exposure -= if input.key_pressed(Key::Minus) { 1.0 / 3.0 } else { 0.0 };
+            let digits = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7];
+            if let Some(i) = digits.iter().position(|&key| input.key_pressed(key)) {
+                p.channel = i;
+            }
+        });
+        if reload {
+            self.reload(true);
+        }
+        wishes
+    }
+
+    fn grant(&mut self, wishes: Wishes) {
+        if let Some(model) = &self.model {
+            if wishes.frame_model {
+                self.parameters.orbit =
+                    Some(Orbit::new(&model.opened.view.camera, loader::middle(&model.opened.scene)));
+            }
+            if wishes.reset_material
+                && let Some(material) = self.parameters.materials.get_mut(self.material)
+            {
+                material.clone_from(&model.authored[self.material]);
+            }
+        }
+        if wishes.light {
+            match self.parameters.environment.parse() {
+                Ok(choice) => self.loader.ask(Job::Light(choice, self.parameters.environment_rotation)),
+                Err(error) => self.message = format!("environment: {error}"),
+            }
+        }
+        let beside = |extension: &str| {
+            let name = self.model.as_ref().map_or("kinran", |model| model.opened.name.as_str());
+            Path::new(name).with_extension(extension)
+        };
+        let saved = if wishes.save_picture {
+            let path = beside("kinran.png");
+            Some((self.save_picture(&path), path))
+        } else if wishes.save_parameters {
+            let path = beside("kinran.json");
+            Some((self.parameters.save(&path), path))
+        } else {
+            None
+        };
+        if let Some((result, path)) = saved {
+            self.message = match result {
+                Ok(()) => format!("saved {}", path.display()),
+                Err(error) => error.to_string(),
+            };
+        }
+    }
+
+    /// The picture without the controls, both sides of the line.
+    fn save_picture(&self, path: &Path) -> Result<(), Error> {
+        let display = |film: &Film| to_srgb8(&film.pixels, self.parameters.exposure, self.parameters.curve());
+        let Some(left) = &self.sides[0] else { return Err(Error::Usage("there is no picture yet".into())) };
+        let film = left.target.film(&self.gpu)?;
+        let mut pixels = display(&film);
+        if let (true, Some(right)) = (self.parameters.split, &self.sides[1]) {
+            let right = display(&right.target.film(&self.gpu)?);
+            let column = (self.parameters.split_at * film.width as f32) as usize;
+            for (row, from) in pixels.chunks_mut(film.width as usize).zip(right.chunks(film.width as usize)) {
+                row[column..].copy_from_slice(&from[column..]);
+            }
+        }
+        write_rgb8(path, film.width, film.height, pixels)
+    }
+
+    /// The picture, and what a pointer does to it.
+    fn picture(&mut self, ui: &mut egui::Ui) {
+        let rect = ui.max_rect();
+        let scale = ui.ctx().pixels_per_point();
+        let limit = self.gpu.device.limits().max_texture_dimension_2d as f32;
+        let pixels = |points: f32| (points * scale).round().clamp(1.0, limit) as u32;
+        let size = (pixels(rect.width()), pixels(rect.height()));
+
+        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        let line = rect.left() + self.parameters.split_at * rect.width();
+        if self.parameters.split {
+            let handle = Rect::from_x_y_ranges(line - 6.0..=line + 6.0, rect.y_range());
+            let drag = ui.interact(handle, ui.scope_id().with("split"), Sense::drag());
+            if drag.hovered() || drag.dragged() {
+                ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
+            }
+            self.parameters.split_at =
+                ((line + drag.drag_delta().x - rect.left()) / rect.width()).clamp(0.0, 1.0);
+        }
+        if let Some(orbit) = &mut self.parameters.orbit {
+            let delta = response.drag_delta();
+            if response.dragged_by(egui::PointerButton::Primary) {
+                orbit.turn(delta.x, delta.y);
+            } else if response.dragged() {
+                orbit.pan(delta.x / rect.height(), delta.y / rect.height());
+            }
+            if response.hovered() {
+                // Fifty points are a notch of most wheels.
+                let scroll = ui.input(|input| input.smooth_scroll_delta().y);
+                if scroll != 0.0 {
+                    orbit.approach(scroll / 50.0);
+                }
+            }
+        }
+
+        self.apply();
+        let methods = self.methods();
+        self.draw(0, methods[0], size);
+        if self.parameters.split {
+            self.draw(1, methods[1], size);
+        }
+
+        // Left of the line one picture, right of it the other.
+        let painter = ui.painter_at(rect);
+        painter.rect_filled(rect, 0.0, Color32::from_gray(40));
+        let at = if self.parameters.split { self.parameters.split_at } else { 1.0 };
+        let half = |side: &Option<Side>, from: f32, to: f32| {
+            let Some(side) = side.as_ref().filter(|side| side.target.frames > 0) else { return };
+            let x = |share: f32| rect.left() + share * rect.width();
+            let part = Rect::from_min_max(pos2(x(from), rect.top()), pos2(x(to), rect.bottom()));
+            painter.image(side.id, part, Rect::from_min_max(pos2(from, 0.0), pos2(to, 1.0)), Color32::WHITE);
+        };
+        half(&self.sides[0], 0.0, at);
+        if self.parameters.split {
+            half(&self.sides[1], at, 1.0);
+            let white = egui::Stroke::new(1.5, Color32::WHITE);
+            painter.vline(line, rect.y_range(), white);
+            let label = |x: f32, align, i: usize| {
+                let name = METHODS[self.parameters.methods[i]].0;
+                let font = egui::FontId::proportional(16.0);
+                painter.text(pos2(x, rect.top() + 10.0), align, name, font, Color32::WHITE);
+            };
+            label(line - 10.0, egui::Align2::RIGHT_TOP, 0);
+            label(line + 10.0, egui::Align2::LEFT_TOP, 1);
+        }
+        if self.model.is_none() && self.busy.is_empty() {
+            let font = egui::FontId::proportional(20.0);
+            let text = "drop a .glb or .gltf file here";
+            painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, Color32::GRAY);
+        }
+    }
+
+    /// Words over the picture: what is being done, what went wrong, the keys.
+    fn words(&mut self, ctx: &egui::Context) {
+        if !self.busy.is_empty() {
+            egui::Area::new(egui::Id::unique("busy"))
+                .anchor(egui::Align2::LEFT_BOTTOM, vec2(12.0, -12.0))
+                .show(ctx, |ui| {
+                    egui::Frame::popup(ui.style()).show(ui, |ui| {
+                        ui.horizontal(|ui| {
+                            ui.spinner();
+                            ui.label(&self.busy);
+                        });
+                    });
+                });
+        }
+        let mut open = !self.message.is_empty();
+        egui::Window::new("Message")
+            .open(&mut open)
+            .collapsible(false)
+            .show(ctx, |ui| ui.label(&self.message));
+        if !open {
+            self.message.clear();
+        }
+        if !self.shader_error.is_empty() {
+            egui::Window::new("Shader").anchor(egui::Align2::LEFT_TOP, vec2(12.0, 12.0)).show(ctx, |ui| {
+                ui.set_max_width(560.0);
+                ui.label("This does not compile; the last shaders that did are drawing.");
+                ui.colored_label(
+                    Color32::from_rgb(255, 140, 120),
+                    egui::RichText::new(&self.shader_error).monospace(),
+                );
+            });
+        }
+        egui::Window::new("Keys").open(&mut self.help).collapsible(false).show(ctx, |ui| {
+            egui::Grid::new("keys").striped(true).show(ui, |ui| {
+                for (key, what) in KEYS {
+                    ui.strong(key);
+                    ui.label(what);
+                    ui.end_row();
+                }
+            });
+        });
+    }
+
+    /// Takes the picture of the window that the command line asks for, and closes it afterwards.
+    fn take_screenshot(&mut self, ctx: &egui::Context) {
+        if *self.closing.lock().expect("no thread panics") {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+            return;
+        }
+        if !(self.settled()
+            || self.shader_error.contains(':') && self.sides[0].as_ref().is_some_and(|s| s.target.frames > 0))
+        {
+            return;
+        }
+        let Some(path) = self.screenshot.take() else { return };
+        let (closing, failure, wake) = (self.closing.clone(), self.failure.clone(), ctx.clone());
+        ctx.request_screenshot(move |image| {
+            let pixels = image.pixels.iter().map(|p| [p.r(), p.g(), p.b()]).collect();
+            if let Err(error) = write_rgb8(&path, image.size[0] as u32, image.size[1] as u32, pixels) {
+                *failure.lock().expect("no thread panics") = Some(error);
+            }
+            *closing.lock().expect("no thread panics") = true;
+            wake.request_repaint();
+        });
+    }
+}
+
+impl eframe::App for App {
+    fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
+        let ctx = ui.ctx().clone();
+        self.receive();
+        self.reload(false);
+        let dropped = ctx.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
+        if let Some(path) = dropped {
+            match loader::model_in(&path) {
+                Ok(file) => self.loader.ask(Job::Open(file, args_with_light(&self.args, &self.parameters))),
+                Err(error) => self.message = error.to_string(),
+            }
+        }
+        let mut wishes = self.keys(&ctx);
+
+        let shown = Shown {
+            name: self.model.as_ref().map_or("no model", |m| &m.opened.name),
+            material_names: self.model.as_ref().map_or(&[], |m| &m.opened.material_names),
+            mapped: self.model.as_ref().map_or(&[], |m| &m.mapped),
+            baked: &self
+                .model
+                .as_ref()
+                .map_or_else(Vec::new, |m| m.scenes.keys().copied().collect::<Vec<_>>()),
+            frames: self.sides[0].as_ref().map_or(0, |side| side.target.frames),
+            frames_wanted: FRAMES,
+        };
+        let (parameters, material) = (&mut self.parameters, &mut self.material);
+        egui::Panel::right("controls").default_size(320.0).show(ui, |ui| {
+            egui::ScrollArea::vertical().show(ui, |ui| {
+                let asked = panel(ui, parameters, material, &shown);
+                wishes = Wishes {
+                    frame_model: wishes.frame_model | asked.frame_model,
+                    save_picture: wishes.save_picture | asked.save_picture,
+                    save_parameters: wishes.save_parameters | asked.save_parameters,
+                    ..asked
+                };
+            });
+        });
+        egui::CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
+        self.grant(wishes);
+        self.words(&ctx);
+        self.take_screenshot(&ctx);
+
+        // Until the picture is smooth there is a next frame; after that, only the shader folder is looked at.
+        if self.model.is_some() && !self.settled() {
+            ctx.request_repaint();
+        } else if self.shaders.folder.is_some() {
+            ctx.request_repaint_after(SHADER_INTERVAL);
+        }
+    }
+}
+
+/// Whether two sets of parameters give the same two pictures: the split line may have moved.
+fn same_picture(a: &Parameters, b: &Parameters) -> bool {
+    let picture = |p: &Parameters| Parameters {
+        split: false,
+        split_at: 0.0,
+        environment: String::new(),
+        environment_rotation: 0.0,
+        ..p.clone()
+    };
+    picture(a) == picture(b)
+}
+
+/// The view's flags with the environment that the parameters name.
+fn args_with_light(args: &ViewArgs, parameters: &Parameters) -> ViewArgs {
+    let env: EnvironmentChoice = parameters.environment.parse().unwrap_or(EnvironmentChoice::Studio);
+    ViewArgs { env, env_rotation: parameters.environment_rotation, ..args.clone() }
+}
+
+/// When a file of the shader folder was last saved.
+fn newest(shaders: &ShaderSource) -> Option<SystemTime> {
+    let entries = std::fs::read_dir(shaders.folder.as_ref()?).ok()?;
+    entries.filter_map(|entry| entry.ok()?.metadata().ok()?.modified().ok()).max()
+}

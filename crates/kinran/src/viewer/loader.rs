@@ -1,0 +1,236 @@
+//! Reading, baking and bringing to the device, in a thread of its own: the window never waits.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, RwLock};
+
+use glam::Vec3;
+use kinran_image::write_atomically;
+use kinran_render::realtime::{GpuLight, GpuScene, Realtime, ShaderSource};
+use kinran_render::reference::{RenderScene, SurfaceTextures, Surroundings};
+use kinran_scene::Scene;
+
+use crate::surfaces::{Mips, scene_surfaces};
+use crate::view::{EnvironmentChoice, View, ViewArgs, environment};
+use crate::{Error, Progress};
+
+/// What the window asks for.
+pub(super) enum Job {
+    /// A file to show from now on.
+    Open(PathBuf, ViewArgs),
+    /// The textures of a method.
+    Bake(Mips),
+    /// Other light from all around: a choice, and its rotation in degrees.
+    Light(EnvironmentChoice, f32),
+}
+
+/// What the window gets.
+pub(super) enum Event {
+    /// A model, to be shown without mips until they are baked.
+    Opened(Box<Opened>),
+    /// A model with the textures of a method.
+    Baked(Mips, Box<GpuScene>),
+    /// All that was baked is out of date: the light changed.
+    LightChanged,
+    /// What is being done; empty when nothing is.
+    Busy(String),
+    /// What went wrong.
+    Failed(String),
+}
+
+/// A model that was just read.
+pub(super) struct Opened {
+    pub(super) name: String,
+    pub(super) view: View,
+    pub(super) material_names: Vec<String>,
+    pub(super) scene: RenderScene,
+    pub(super) warnings: Vec<String>,
+}
+
+/// The thread.
+pub(super) struct Loader {
+    jobs: Sender<Job>,
+    events: Receiver<Event>,
+}
+
+impl Loader {
+    /// Starts it. `wake` is called whenever there is an event.
+    pub(super) fn start(renderer: Arc<RwLock<Realtime>>, wake: impl Fn() + Send + 'static) -> Self {
+        let (jobs, todo) = channel();
+        let (send, events) = channel();
+        let mut work = Work { renderer, model: None, surfaces: HashMap::new(), light: None };
+        std::thread::spawn(move || {
+            let tell = |event| {
+                // A window that is gone hears nothing.
+                let sent = send.send(event);
+                wake();
+                sent.is_ok()
+            };
+            while let Ok(job) = todo.recv() {
+                let _ = tell(Event::Busy(work.describe(&job)));
+                let heard = match work.run(job) {
+                    Ok(events) => events.into_iter().all(tell),
+                    Err(error) => tell(Event::Failed(error.to_string())),
+                };
+                if !(heard && tell(Event::Busy(String::new()))) {
+                    return;
+                }
+            }
+        });
+        Self { jobs, events }
+    }
+
+    /// Asks for something.
+    pub(super) fn ask(&self, job: Job) {
+        // The thread ends only with the window.
+        let _ = self.jobs.send(job);
+    }
+
+    /// The next event, if there is one.
+    pub(super) fn event(&self) -> Option<Event> {
+        self.events.try_recv().ok()
+    }
+}
+
+struct Work {
+    renderer: Arc<RwLock<Realtime>>,
+    model: Option<(Scene, RenderScene)>,
+    /// Textures of the model that were baked.
+    surfaces: HashMap<Mips, Vec<Option<SurfaceTextures>>>,
+    /// The model's light on the device.
+    light: Option<GpuLight>,
+}
+
+impl Work {
+    fn describe(&self, job: &Job) -> String {
+        match job {
+            Job::Open(path, _) => format!("reading {}", path.display()),
+            Job::Bake(mips) => format!("baking {}", mips.name()),
+            Job::Light(..) => "filtering the environment".into(),
+        }
+    }
+
+    fn run(&mut self, job: Job) -> Result<Vec<Event>, Error> {
+        match job {
+            Job::Open(path, args) => {
+                let scene = Scene::load(&path)?;
+                let view = View::new(&scene, &path.to_string_lossy(), &args)?;
+                let plain = vec![None; scene.materials.len()];
+                let prepared = view.scene(&scene, plain)?;
+                let opened = Opened {
+                    name: path.to_string_lossy().into_owned(),
+                    view,
+                    material_names: scene.materials.iter().map(|m| m.name.clone()).collect(),
+                    scene: prepared.clone(),
+                    warnings: scene.warnings.clone(),
+                };
+                self.model = Some((scene, prepared));
+                self.surfaces.clear();
+                self.light = None;
+                Ok(vec![Event::Opened(Box::new(opened))])
+            }
+            Job::Bake(mips) => {
+                let Some((scene, prepared)) = &self.model else { return Ok(Vec::new()) };
+                if !self.surfaces.contains_key(&mips) {
+                    let (surfaces, _) = scene_surfaces(scene, mips, &Progress::new(false))?;
+                    self.surfaces.insert(mips, surfaces);
+                }
+                let mut with_mips = prepared.clone();
+                for (material, surface) in with_mips.materials.iter_mut().zip(&self.surfaces[&mips]) {
+                    material.surface.clone_from(surface);
+                }
+                let renderer = self.renderer.read().map_err(|e| Error::Internal(e.to_string()))?;
+                let light = self.light.get_or_insert_with(|| renderer.light_of(&with_mips));
+                Ok(vec![Event::Baked(mips, Box::new(renderer.load(&with_mips, light)))])
+            }
+            Job::Light(choice, rotation) => {
+                let surroundings = environment(&choice, rotation)?.map(Surroundings::new).map(Arc::new);
+                if let Some((_, prepared)) = &mut self.model {
+                    prepared.surroundings = surroundings;
+                }
+                self.light = None;
+                Ok(vec![Event::LightChanged])
+            }
+        }
+    }
+}
+
+/// The model that a path names: a file itself, or the only glTF file in a folder.
+///
+/// # Errors
+/// [`Error::Usage`] for a path that does not exist and a folder with none or several.
+pub(super) fn model_in(path: &Path) -> Result<PathBuf, Error> {
+    let complain = |e: &dyn std::fmt::Display| Error::Usage(format!("{}: {e}", path.display()));
+    if !path.exists() {
+        return Err(complain(&"there is no such file or folder"));
+    }
+    if !path.is_dir() {
+        return Ok(path.into());
+    }
+    let mut models = Vec::new();
+    for entry in std::fs::read_dir(path).map_err(|e| complain(&e))? {
+        let file = entry.map_err(|e| complain(&e))?.path();
+        if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb") || e.eq_ignore_ascii_case("gltf")) {
+            models.push(file);
+        }
+    }
+    models.sort();
+    match models.as_slice() {
+        [] => Err(complain(&"no .glb or .gltf file in this folder; name one")),
+        [model] => Ok(model.clone()),
+        [first, ..] => Err(complain(&format!(
+            "{} models in this folder; name one, such as {}",
+            models.len(),
+            first.display()
+        ))),
+    }
+}
+
+/// Puts the built-in shaders into a folder, as far as they are not there.
+///
+/// # Errors
+/// [`Error::Usage`] and [`Error::Image`] when it cannot be written.
+pub(super) fn fill_shader_folder(folder: &Path) -> Result<(), Error> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::Usage(format!("{}: {e}", folder.display())))?;
+    for (name, text) in ShaderSource::files() {
+        let path = folder.join(name);
+        if !path.exists() {
+            write_atomically(&path, text.as_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+/// The middle of what a scene shows.
+pub(super) fn middle(scene: &RenderScene) -> Vec3 {
+    scene.geometry.bounds().map_or(Vec3::ZERO, |(min, max)| 0.5 * (min + max))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_a_model_only_when_it_holds_one() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(model_in(folder.path()).unwrap_err().to_string().contains("no .glb"));
+        std::fs::write(folder.path().join("a.glb"), "").unwrap();
+        std::fs::write(folder.path().join("a.png"), "").unwrap();
+        assert_eq!(model_in(folder.path()).unwrap(), folder.path().join("a.glb"));
+        std::fs::write(folder.path().join("b.gltf"), "").unwrap();
+        assert!(model_in(folder.path()).unwrap_err().to_string().contains("2 models"));
+        assert!(model_in(&folder.path().join("c")).unwrap_err().to_string().contains("no such"));
+    }
+
+    #[test]
+    fn filling_a_folder_keeps_what_was_edited() {
+        let folder = tempfile::tempdir().unwrap();
+        fill_shader_folder(folder.path()).unwrap();
+        let edited = folder.path().join("tonemap.wgsl");
+        std::fs::write(&edited, "edited").unwrap();
+        fill_shader_folder(folder.path()).unwrap();
+        assert_eq!(std::fs::read_to_string(edited).unwrap(), "edited");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), ShaderSource::files().count());
+    }
+}

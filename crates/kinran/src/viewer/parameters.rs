@@ -1,0 +1,236 @@
+//! What the window's controls say; what is saved and loaded.
+
+use std::path::Path;
+
+use glam::Vec3;
+use kinran_bake::aniso::Filter;
+use kinran_image::write_atomically;
+use kinran_render::realtime::{Adjustment, Channel};
+use kinran_render::tonemap::Tonemap;
+use kinran_scene::{Light, LightKind};
+use serde::{Deserialize, Serialize};
+
+use super::orbit::Orbit;
+use crate::Error;
+use crate::surfaces::Mips;
+use crate::view::{Curve, EnvironmentChoice, ViewArgs};
+
+/// Names and meanings of what can be shown of a surface.
+pub(super) const CHANNELS: [(&str, Channel); 7] = [
+    ("lit", Channel::Lit),
+    ("normal", Channel::Normal),
+    ("alpha_t", Channel::AlphaT),
+    ("alpha_b", Channel::AlphaB),
+    ("direction", Channel::Direction),
+    ("mip level", Channel::Mip),
+    ("base colour", Channel::BaseColor),
+];
+
+/// Names and meanings of the ways to filter.
+pub(super) const METHODS: [(&str, Mips); 5] = [
+    ("ml", Mips::Filtered(Filter::Ml)),
+    ("linear", Mips::Filtered(Filter::Linear)),
+    ("lean", Mips::Filtered(Filter::Lean)),
+    ("naive", Mips::Filtered(Filter::Naive)),
+    ("ground truth", Mips::Level0),
+];
+
+/// A material as the sliders have it; factors multiply its textures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct MaterialParameters {
+    pub(super) base_color: [f32; 3],
+    pub(super) metallic: f32,
+    /// Perceptual roughness; multiplies what is baked where there are maps.
+    pub(super) roughness: f32,
+    /// Exponent of the ratio of both alphas.
+    pub(super) anisotropy: f32,
+    /// Degrees.
+    pub(super) rotation: f32,
+    pub(super) normal_scale: f32,
+    pub(super) emissive: [f32; 3],
+    pub(super) occlusion: f32,
+}
+
+impl MaterialParameters {
+    pub(super) fn adjustment(&self, mapped: bool) -> Adjustment {
+        // The factor of an unmapped material is its roughness itself; alpha goes with the square.
+        let roughness = if mapped { self.roughness * self.roughness } else { 1.0 };
+        Adjustment {
+            roughness,
+            anisotropy: self.anisotropy,
+            rotation: self.rotation.to_radians(),
+            normal_scale: self.normal_scale,
+        }
+    }
+}
+
+/// A directional light.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Sun {
+    pub(super) on: bool,
+    /// Degrees about +y from +z.
+    pub(super) azimuth: f32,
+    /// Degrees above the horizon.
+    pub(super) elevation: f32,
+    /// Lux.
+    pub(super) lux: f32,
+}
+
+impl Sun {
+    pub(super) fn light(&self) -> Light {
+        let (sin, cos) = self.elevation.to_radians().sin_cos();
+        let azimuth = self.azimuth.to_radians();
+        Light {
+            kind: LightKind::Directional,
+            color: Vec3::splat(self.lux),
+            position: Vec3::ZERO,
+            direction: -Vec3::new(azimuth.sin() * cos, sin, azimuth.cos() * cos),
+            range: f32::INFINITY,
+        }
+    }
+}
+
+/// Everything that a control sets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Parameters {
+    /// Index into [`METHODS`]: what is left of the split line, and right of it.
+    pub(super) methods: [usize; 2],
+    /// Whether there is a split line.
+    pub(super) split: bool,
+    /// Share of the picture left of it.
+    pub(super) split_at: f32,
+    /// Index into [`CHANNELS`].
+    pub(super) channel: usize,
+    /// Stops.
+    pub(super) exposure: f32,
+    /// `aces`, `agx` or `none`.
+    pub(super) tonemap: String,
+    /// A file, `studio` or `none`.
+    pub(super) environment: String,
+    /// Degrees.
+    pub(super) environment_rotation: f32,
+    /// The environment is seen behind the model.
+    pub(super) background: bool,
+    /// The file's own lights shine.
+    pub(super) own_lights: bool,
+    pub(super) sun: Sun,
+    pub(super) shadows: bool,
+    pub(super) all_deferred: bool,
+    /// `None` until a model is framed.
+    pub(super) orbit: Option<Orbit>,
+    /// As many as the model has; empty until one is loaded.
+    pub(super) materials: Vec<MaterialParameters>,
+}
+
+impl Parameters {
+    /// What the flags of the command line say.
+    pub(super) fn from_args(view: &ViewArgs) -> Self {
+        let towards = view.light.first().copied().unwrap_or(Vec3::new(-0.5, 0.7, 0.6)).normalize();
+        Self {
+            methods: [0, 3],
+            split: false,
+            split_at: 0.5,
+            channel: 0,
+            exposure: view.exposure,
+            tonemap: match view.tonemap {
+                Curve::Aces => "aces",
+                Curve::Agx => "agx",
+                Curve::None => "none",
+            }
+            .into(),
+            environment: match &view.env {
+                EnvironmentChoice::Studio => "studio".into(),
+                EnvironmentChoice::None => "none".into(),
+                EnvironmentChoice::File(path) => path.to_string_lossy().into_owned(),
+            },
+            environment_rotation: view.env_rotation,
+            background: matches!(view.env, EnvironmentChoice::File(_)),
+            own_lights: view.light.is_empty(),
+            sun: Sun {
+                on: !view.light.is_empty() || view.env == EnvironmentChoice::None,
+                azimuth: towards.x.atan2(towards.z).to_degrees(),
+                elevation: towards.y.asin().to_degrees(),
+                lux: std::f32::consts::PI,
+            },
+            shadows: !view.no_shadows,
+            all_deferred: false,
+            orbit: None,
+            materials: Vec::new(),
+        }
+    }
+
+    /// The tone curve named.
+    pub(super) fn curve(&self) -> Tonemap {
+        match self.tonemap.as_str() {
+            "none" => Tonemap::None,
+            "agx" => Tonemap::AgX,
+            _ => Tonemap::Aces,
+        }
+    }
+
+    /// Reads what [`Parameters::save`] wrote.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the file and what is wrong in it.
+    pub(super) fn load(path: &Path) -> Result<Self, Error> {
+        let complain = |e: &dyn std::fmt::Display| Error::Usage(format!("{}: {e}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(|e| complain(&e))?;
+        let parameters: Self = serde_json::from_str(&text).map_err(|e| complain(&e))?;
+        let checks = [
+            ("methods", parameters.methods.iter().all(|&m| m < METHODS.len()), "two numbers from 0 to 4"),
+            ("channel", parameters.channel < CHANNELS.len(), "a number from 0 to 6"),
+            ("split_at", (0.0..=1.0).contains(&parameters.split_at), "a number from 0 to 1"),
+            ("tonemap", ["aces", "agx", "none"].contains(&parameters.tonemap.as_str()), "aces, agx or none"),
+        ];
+        for (field, good, want) in checks {
+            if !good {
+                return Err(complain(&format!("{field} must be {want}")));
+            }
+        }
+        Ok(parameters)
+    }
+
+    /// Writes everything as JSON, whole or not at all.
+    ///
+    /// # Errors
+    /// Those of [`write_atomically`].
+    pub(super) fn save(&self, path: &Path) -> Result<(), Error> {
+        let text = serde_json::to_string_pretty(self).map_err(|e| Error::Internal(e.to_string()))?;
+        Ok(write_atomically(path, (text + "\n").as_bytes())?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn saved_parameters_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        let mut parameters = Parameters::from_args(&ViewArgs::default());
+        parameters.sun.azimuth = 12.5;
+        parameters.split = true;
+        parameters.save(&path).unwrap();
+        assert_eq!(Parameters::load(&path).unwrap(), parameters);
+    }
+
+    #[test]
+    fn a_number_out_of_range_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        let parameters = Parameters { channel: 99, ..Parameters::from_args(&ViewArgs::default()) };
+        parameters.save(&path).unwrap();
+        let error = Parameters::load(&path).unwrap_err().to_string();
+        assert!(error.contains("a.json") && error.contains("channel"), "{error}");
+    }
+
+    #[test]
+    fn the_sun_stands_where_its_angles_say() {
+        let sun = Sun { on: true, azimuth: 90.0, elevation: 30.0, lux: 1.0 };
+        let want = -Vec3::new(0.75_f32.sqrt(), 0.5, 0.0);
+        let got = sun.light().direction;
+        assert!((want - got).length() < 1e-6, "wanted {want}, got {got}");
+    }
+}
