@@ -12,6 +12,7 @@ use kinran_bake::folder::{Hints, scan};
 use kinran_image::{
     Channels, Image, Pixels, Role, Texture, encode_ktx2, encode_parallel, write_atomically, write_png,
 };
+use rayon::prelude::*;
 
 fn main() {
     let side: u32 = std::env::var("KINRAN_SIDE").ok().and_then(|s| s.parse().ok()).unwrap_or(4096);
@@ -89,10 +90,10 @@ fn bake(folder: &Path, filter: Filter, sheets: &[SheetRequest]) -> Vec<Texture> 
 }
 
 fn write(folder: &Path, textures: &[Texture]) {
-    for (i, texture) in textures.iter().enumerate() {
+    textures.par_iter().enumerate().for_each(|(i, texture)| {
         let bytes = encode_ktx2(texture, Some(3)).expect("a container");
         write_atomically(&folder.join(format!("out_{i}.ktx2")), &bytes).expect("written");
-    }
+    });
 }
 
 fn rgba8_levels(texture: &Texture) -> Vec<(u32, u32, Vec<u8>)> {

@@ -33,33 +33,45 @@ pub(crate) fn wrapped(i: i64, len: u32, wrap: Wrap) -> u32 {
 /// Reads one channel, normalised; enlarges bilinearly where the image is smaller than level 0.
 #[inline(always)]
 pub(crate) fn read_channel(image: &Image, channel: usize, at: Place, out: &mut [f32]) {
-    let channels = image.channels as usize;
-    let asked = channel;
-    // Grey images answer for red, green and blue; images without alpha are opaque.
-    let channel = match (channels, channel) {
-        (1 | 3, 3) => {
-            out.fill(1.0);
-            return;
-        }
-        (2, 3) => 1,
-        (1 | 2, _) => 0,
-        _ => channel,
-    };
-    if (image.width, image.height) == at.size {
-        let start = (at.y as usize * image.width as usize + at.x0 as usize) * channels;
-        let range = start..start + out.len() * channels;
-        match &image.pixels {
-            Pixels::U8(data) => {
-                deinterleave(&data[range], channels, channel, |v| f32::from(v) * (1.0 / 255.0), out)
-            }
-            Pixels::U16(data) => {
-                deinterleave(&data[range], channels, channel, |v| f32::from(v) * (1.0 / 65535.0), out)
-            }
-            Pixels::F32(data) => deinterleave(&data[range], channels, channel, |v| v, out),
+    read_channels(image, [channel], at, [out]);
+}
+
+/// [`read_channel`] of several channels at once, of one length.
+#[inline(always)]
+pub(crate) fn read_channels<const K: usize>(
+    image: &Image,
+    channels: [usize; K],
+    at: Place,
+    out: [&mut [f32]; K],
+) {
+    if (image.width, image.height) != at.size {
+        for (channel, out) in channels.into_iter().zip(out) {
+            enlarge_channel(image, channel, at, out);
         }
         return;
     }
+    // Grey images answer for red, green and blue; images without alpha are opaque.
+    let stored = image.channels as usize;
+    let planes = channels.map(|channel| match (stored, channel) {
+        (1 | 3, 3) => OPAQUE,
+        (2, 3) => 1,
+        (1 | 2, _) => 0,
+        _ => channel,
+    });
+    let start = (at.y as usize * image.width as usize + at.x0 as usize) * stored;
+    let range = start..start + out.first().map_or(0, |out| out.len()) * stored;
+    match &image.pixels {
+        Pixels::U8(data) => deinterleave(&data[range], stored, planes, |v| f32::from(v) * (1.0 / 255.0), out),
+        Pixels::U16(data) => {
+            deinterleave(&data[range], stored, planes, |v| f32::from(v) * (1.0 / 65535.0), out);
+        }
+        Pixels::F32(data) => deinterleave(&data[range], stored, planes, |v| v, out),
+    }
+}
 
+/// Reads one channel of an image that is smaller than level 0, bilinearly.
+#[inline(always)]
+fn enlarge_channel(image: &Image, channel: usize, at: Place, out: &mut [f32]) {
     let along = |i: u32, from: u32, to: u32, wrap: Wrap| {
         let center = (f64::from(i) + 0.5) * f64::from(from) / f64::from(to) - 0.5;
         let lower = center.floor();
@@ -68,41 +80,61 @@ pub(crate) fn read_channel(image: &Image, channel: usize, at: Place, out: &mut [
     let (row0, row1, fy) = along(at.y, image.height, at.size.1, at.wrap[1]);
     for (x, o) in (at.x0..).zip(out) {
         let (col0, col1, fx) = along(x, image.width, at.size.0, at.wrap[0]);
-        let sample = |col, row| image.texel(col, row)[asked];
+        let sample = |col, row| image.texel(col, row)[channel];
         let upper = sample(col0, row0) + (sample(col1, row0) - sample(col0, row0)) * fx;
         let lower = sample(col0, row1) + (sample(col1, row1) - sample(col0, row1)) * fx;
         *o = upper + (lower - upper) * fy;
     }
 }
 
-/// Every `channels`-th sample, converted. Picking samples and converting them are loops of their own: only so
-/// does the compiler find the byte shuffles for the first.
+/// Texels taken apart at a time.
+const RUN: usize = 64;
+
+/// The plane of ones, after the four of an image.
+const OPAQUE: usize = 4;
+
+/// Takes interleaved samples of `stored` channels apart and hands out the planes asked for. Converting samples
+/// and picking them are loops of their own, of known lengths: only so does the compiler find shuffles for both.
 #[inline(always)]
-fn deinterleave<T: Copy + Default>(
+fn deinterleave<T: Copy, const K: usize>(
     data: &[T],
-    channels: usize,
-    channel: usize,
-    convert: impl Fn(T) -> f32,
-    out: &mut [f32],
+    stored: usize,
+    planes: [usize; K],
+    convert: impl Fn(T) -> f32 + Copy,
+    out: [&mut [f32]; K],
 ) {
-    #[inline(always)]
-    fn pick<const N: usize, T: Copy>(data: &[T], channel: usize, plane: &mut [T]) {
-        assert!(channel < N, "channel {channel} of {N}");
-        for (p, texel) in plane.iter_mut().zip(data.chunks_exact(N)) {
-            *p = texel[channel];
-        }
+    match stored {
+        1 => deinterleave_by::<T, 1, K>(data, planes, convert, out),
+        2 => deinterleave_by::<T, 2, K>(data, planes, convert, out),
+        3 => deinterleave_by::<T, 3, K>(data, planes, convert, out),
+        _ => deinterleave_by::<T, 4, K>(data, planes, convert, out),
     }
-    let mut plane = [T::default(); 128];
-    for (data, out) in data.chunks(plane.len() * channels).zip(out.chunks_mut(plane.len())) {
-        let plane = &mut plane[..out.len()];
-        match channels {
-            1 => plane.copy_from_slice(data),
-            2 => pick::<2, T>(data, channel, plane),
-            3 => pick::<3, T>(data, channel, plane),
-            _ => pick::<4, T>(data, channel, plane),
-        }
-        for (o, v) in out.iter_mut().zip(plane) {
+}
+
+#[inline(always)]
+fn deinterleave_by<T: Copy, const N: usize, const K: usize>(
+    data: &[T],
+    planes: [usize; K],
+    convert: impl Fn(T) -> f32,
+    mut out: [&mut [f32]; K],
+) {
+    let mut samples = [[0.0; N]; RUN];
+    let mut apart = [[1.0; RUN]; OPAQUE + 1];
+    for (run, data) in data.chunks(RUN * N).enumerate() {
+        for (o, v) in samples.as_flattened_mut().iter_mut().zip(data) {
             *o = convert(*v);
+        }
+        for i in 0..RUN {
+            for channel in 0..N {
+                apart[channel][i] = samples[i][channel];
+            }
+        }
+        for (out, plane) in out.iter_mut().zip(planes) {
+            let out = &mut out[run * RUN..];
+            match out.first_chunk_mut() {
+                Some(out) => *out = apart[plane],
+                None => out.copy_from_slice(&apart[plane][..out.len()]),
+            }
         }
     }
 }

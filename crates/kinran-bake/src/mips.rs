@@ -30,13 +30,29 @@ pub(crate) struct PlaneBand<'a> {
     pub(crate) samples: &'a [f32],
 }
 
+/// Columns worked on at a time: the planes of a tile stay in the first-level cache, and loops over arrays of
+/// a known length are what compilers vectorise.
+pub(crate) const TILE: usize = 256;
+
 /// Level 0 as rows of planes.
 pub(crate) trait PlaneRows: Sync {
     /// How many planes there are.
     const PLANES: usize;
-    /// Adds `weight` times row `y` to `sums`, `PLANES` runs of the level's width.
-    fn add_row(&self, y: u32, weight: f32, sums: &mut [f32]);
+    /// Memory kept from call to call.
+    type Scratch: Default;
+    /// Sets columns `x0 .. x0 + len` of every plane's tile to the weighted sum of `rows`; `len` ≤ [`TILE`].
+    fn sum_rows(
+        &self,
+        rows: &Taps,
+        x0: usize,
+        len: usize,
+        scratch: &mut Self::Scratch,
+        sums: &mut [[f32; TILE]],
+    );
 }
+
+/// Levels made in one pass over the level before: the finer ones of them are never stored whole.
+const PASS_LEVELS: usize = 3;
 
 /// Averages level 0 down to 1×1 and hands every band of levels 1 and up to `consume`, in parallel; returns
 /// what it returned, in order, per level. Every level is an average of level 0 alone, in floats, whatever
@@ -48,49 +64,145 @@ pub(crate) fn reduce_levels<R: PlaneRows, T: Send>(
     wrap: [Wrap; 2],
     consume: impl Fn(PlaneBand) -> T + Sync,
 ) -> Vec<Vec<T>> {
+    let steps: Vec<Step> =
+        (1..full_level_count(size.0, size.1)).map(|level| Step::new(size, level, kernel, wrap)).collect();
+    let mut results: Vec<Vec<T>> = steps.iter().map(|_| Vec::new()).collect();
     let mut finer: Vec<f32> = Vec::new();
-    (1..full_level_count(size.0, size.1))
-        .map(|level| {
-            let columns = reduction(size.0, level, kernel, wrap[0]);
-            let rows = reduction(size.1, level, kernel, wrap[1]);
-            let fine_width = level_size(size.0, level - 1) as usize;
-            let width = columns.len();
-            let row_len = width * R::PLANES;
-            let mut coarse = vec![0.0; rows.len() * row_len];
-            let results = coarse
-                .par_chunks_mut(BAND_ROWS as usize * row_len)
-                .zip(rows.par_chunks(BAND_ROWS as usize))
-                .enumerate()
-                .map(|(i, (samples, rows))| {
-                    let source = if level == 1 { Finer::Source(source) } else { Finer::Samples(&finer) };
-                    pulp::Arch::new().dispatch(ReduceBand {
-                        source,
-                        fine_width,
-                        columns: &columns,
-                        rows,
-                        coarse: samples,
-                    });
-                    let y0 = i * BAND_ROWS as usize;
-                    consume(PlaneBand { level, width, y0, rows: rows.len(), samples })
-                })
-                .collect();
-            finer = coarse;
-            results
-        })
-        .collect()
+    let mut first = 0;
+    while first < steps.len() {
+        let rest = &steps[first..];
+        let more = rest[1..].iter().take(PASS_LEVELS - 1).take_while(|step| step.rows_halve).count();
+        let pass = Pass {
+            source: if first == 0 { Finer::Source(source) } else { Finer::Samples(&finer) },
+            steps: &rest[..=more],
+            consume: &consume,
+        };
+        let last = &rest[more];
+        let band_len = BAND_ROWS as usize * last.row_len::<R>();
+        let mut coarse = vec![0.0; last.rows.len() * last.row_len::<R>()];
+        let room: usize = rest[..more].iter().map(|step| BAND_ROWS as usize * step.row_len::<R>()).sum();
+        let bands: Vec<Vec<Vec<T>>> = coarse
+            .par_chunks_mut(band_len)
+            .enumerate()
+            .map_init(
+                || vec![0.0; room],
+                |room, (i, samples)| {
+                    let mut made: Vec<Vec<T>> = pass.steps.iter().map(|_| Vec::new()).collect();
+                    pass.make_band(more, i, samples, room, &mut made);
+                    made
+                },
+            )
+            .collect();
+        for (level, made) in bands.into_iter().flat_map(|made| made.into_iter().enumerate()) {
+            results[first + level].extend(made);
+        }
+        finer = coarse;
+        first += more + 1;
+    }
+    results
 }
 
-/// Where a level is averaged from.
+/// How a level follows from the one before.
+struct Step {
+    level: usize,
+    fine_width: usize,
+    columns: Vec<Taps>,
+    rows: Vec<Taps>,
+    columns_halve: bool,
+    rows_halve: bool,
+}
+
+impl Step {
+    fn new(size: (u32, u32), level: usize, kernel: Kernel, wrap: [Wrap; 2]) -> Self {
+        let halve = |taps: &[Taps], fine: u32| {
+            fine as usize == 2 * taps.len()
+                && (0..).zip(taps).all(|(x, taps)| taps[..] == [(2 * x, 0.5), (2 * x + 1, 0.5)])
+        };
+        let columns = reduction(size.0, level, kernel, wrap[0]);
+        let rows = reduction(size.1, level, kernel, wrap[1]);
+        let fine_width = level_size(size.0, level - 1);
+        Step {
+            level,
+            fine_width: fine_width as usize,
+            columns_halve: halve(&columns, fine_width),
+            rows_halve: halve(&rows, level_size(size.1, level - 1)),
+            columns,
+            rows,
+        }
+    }
+
+    /// Samples in a row of all planes.
+    fn row_len<R: PlaneRows>(&self) -> usize {
+        self.columns.len() * R::PLANES
+    }
+}
+
+/// Where a level is averaged from: level 0, or rows of another.
 enum Finer<'a, R> {
     Source(&'a R),
     Samples(&'a [f32]),
 }
 
+impl<R> Clone for Finer<'_, R> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<R> Copy for Finer<'_, R> {}
+
+/// Some levels made together. All but the first halve the rows of the one before, so that a band of theirs
+/// needs two bands of that and no others.
+struct Pass<'a, R, C> {
+    source: Finer<'a, R>,
+    steps: &'a [Step],
+    consume: &'a C,
+}
+
+impl<R: PlaneRows, C> Pass<'_, R, C> {
+    /// Makes and hands on band `i` of level `depth` of the pass, after the bands under it; `room` is for one
+    /// band of each of their levels.
+    fn make_band<T>(&self, depth: usize, i: usize, samples: &mut [f32], room: &mut [f32], made: &mut [Vec<T>])
+    where
+        C: Fn(PlaneBand) -> T,
+    {
+        let step = &self.steps[depth];
+        let (y0, row_len) = (i * BAND_ROWS as usize, step.row_len::<R>());
+        let rows = &step.rows[y0..y0 + samples.len() / row_len];
+        if depth == 0 {
+            pulp::Arch::new().dispatch(ReduceBand {
+                source: self.source,
+                first_row: 0,
+                step,
+                rows,
+                coarse: samples,
+            });
+        } else {
+            let finer = &self.steps[depth - 1];
+            let finer_len = finer.row_len::<R>();
+            let (band, room) = room.split_at_mut(BAND_ROWS as usize * finer_len);
+            let half = BAND_ROWS as usize / 2;
+            for (j, (rows, coarse)) in
+                (2 * i..).zip(rows.chunks(half).zip(samples.chunks_mut(half * row_len)))
+            {
+                let band = &mut band[..2 * rows.len() * finer_len];
+                self.make_band(depth - 1, j, band, room, made);
+                let source = Finer::<R>::Samples(band);
+                let first_row = j * BAND_ROWS as usize;
+                pulp::Arch::new().dispatch(ReduceBand { source, first_row, step, rows, coarse });
+            }
+        }
+        let band = PlaneBand { level: step.level, width: step.columns.len(), y0, rows: rows.len(), samples };
+        made[depth].push((self.consume)(band));
+    }
+}
+
 /// One band of one level, as a unit that is compiled once for each instruction set.
 struct ReduceBand<'a, R> {
     source: Finer<'a, R>,
-    fine_width: usize,
-    columns: &'a [Taps],
+    /// The row that the samples begin with.
+    first_row: usize,
+    step: &'a Step,
     rows: &'a [Taps],
     coarse: &'a mut [f32],
 }
@@ -100,35 +212,57 @@ impl<R: PlaneRows> pulp::WithSimd for ReduceBand<'_, R> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let (fine_width, width) = (self.fine_width, self.columns.len());
-        let fine_row = fine_width * R::PLANES;
-        let halved = fine_width == 2 * width && self.columns.iter().all(|taps| taps.len() == 2);
-        let mut sums = vec![0.0; fine_row];
+        let Step { fine_width, ref columns, columns_halve, .. } = *self.step;
+        let width = columns.len();
+        let mut scratch = R::Scratch::default();
+        let mut tile = vec![[0.0; TILE]; R::PLANES];
+        let mut fine = vec![0.0; if columns_halve { 0 } else { fine_width * R::PLANES }];
         for (taps, coarse) in self.rows.iter().zip(self.coarse.chunks_exact_mut(width * R::PLANES)) {
-            sums.fill(0.0);
-            for &(row, weight) in taps {
+            for x0 in (0..fine_width).step_by(TILE) {
+                let len = TILE.min(fine_width - x0);
                 match self.source {
-                    Finer::Source(source) => source.add_row(row, weight, &mut sums),
+                    Finer::Source(source) => source.sum_rows(taps, x0, len, &mut scratch, &mut tile),
                     Finer::Samples(samples) => {
-                        let start = row as usize * fine_row;
-                        for (sum, v) in sums.iter_mut().zip(&samples[start..start + fine_row]) {
-                            *sum += v * weight;
+                        for (plane, sums) in tile.iter_mut().enumerate() {
+                            sum_samples(samples, taps, &mut sums[..len], |row| {
+                                ((row as usize - self.first_row) * R::PLANES + plane) * fine_width + x0
+                            });
                         }
                     }
                 }
-            }
-            for (fine, coarse) in sums.chunks_exact(fine_width).zip(coarse.chunks_exact_mut(width)) {
-                if halved {
-                    for (c, pair) in coarse.iter_mut().zip(fine.chunks_exact(2)) {
-                        *c = 0.5 * (pair[0] + pair[1]);
-                    }
-                } else {
-                    for (c, taps) in coarse.iter_mut().zip(self.columns) {
-                        *c = taps.iter().map(|&(i, weight)| fine[i as usize] * weight).sum();
+                for (plane, sums) in tile.iter().enumerate() {
+                    if columns_halve {
+                        halve(&sums[..len], &mut coarse[plane * width + x0 / 2..][..len / 2]);
+                    } else {
+                        fine[plane * fine_width + x0..][..len].copy_from_slice(&sums[..len]);
                     }
                 }
             }
+            for (fine, coarse) in fine.chunks_exact(fine_width).zip(coarse.chunks_exact_mut(width)) {
+                for (c, taps) in coarse.iter_mut().zip(columns) {
+                    *c = taps.iter().map(|&(i, weight)| fine[i as usize] * weight).sum();
+                }
+            }
         }
+    }
+}
+
+/// Sets `sums` to the weighted sum of the runs of samples that begin at `start` of each row.
+#[inline(always)]
+fn sum_samples(samples: &[f32], rows: &Taps, sums: &mut [f32], start: impl Fn(u32) -> usize) {
+    sums.fill(0.0);
+    for &(row, weight) in rows {
+        for (sum, v) in sums.iter_mut().zip(&samples[start(row)..]) {
+            *sum += v * weight;
+        }
+    }
+}
+
+/// Averages of pairs.
+#[inline(always)]
+fn halve(fine: &[f32], coarse: &mut [f32]) {
+    for (c, [a, b]) in coarse.iter_mut().zip(fine.as_chunks().0) {
+        *c = 0.5 * (a + b);
     }
 }
 
@@ -141,12 +275,11 @@ struct ImagePlanes<'a> {
 }
 
 impl ImagePlanes<'_> {
-    /// Row `y` as four runs.
+    /// Row `y` from column `x0` on, as four planes.
     #[inline(always)]
-    fn row(&self, y: u32, out: &mut [f32]) {
-        let width = self.size.0 as usize;
-        let at = Place { size: self.size, y, x0: 0, wrap: self.wrap };
-        for (channel, plane) in out.chunks_exact_mut(width).enumerate() {
+    fn row<'p>(&self, y: u32, x0: u32, planes: impl Iterator<Item = &'p mut [f32]>) {
+        let at = Place { size: self.size, y, x0, wrap: self.wrap };
+        for (channel, plane) in planes.enumerate() {
             read_channel(self.image, channel, at, plane);
             if self.transfer == Transfer::Srgb && channel < 3 {
                 for v in plane {
@@ -159,13 +292,26 @@ impl ImagePlanes<'_> {
 
 impl PlaneRows for ImagePlanes<'_> {
     const PLANES: usize = 4;
+    type Scratch = Vec<[f32; TILE]>;
 
     #[inline(always)]
-    fn add_row(&self, y: u32, weight: f32, sums: &mut [f32]) {
-        let mut row = vec![0.0; sums.len()];
-        self.row(y, &mut row);
-        for (sum, v) in sums.iter_mut().zip(&row) {
-            *sum += v * weight;
+    fn sum_rows(
+        &self,
+        rows: &Taps,
+        x0: usize,
+        len: usize,
+        scratch: &mut Self::Scratch,
+        sums: &mut [[f32; TILE]],
+    ) {
+        scratch.resize(Self::PLANES, [0.0; TILE]);
+        sums.fill([0.0; TILE]);
+        for &(y, weight) in rows {
+            self.row(y, x0 as u32, scratch.iter_mut().map(|plane| &mut plane[..len]));
+            for (sums, plane) in sums.iter_mut().zip(&*scratch) {
+                for (sum, v) in sums.iter_mut().zip(plane) {
+                    *sum += v * weight;
+                }
+            }
         }
     }
 }
@@ -194,7 +340,7 @@ pub fn plain_levels(
     let mut finest = vec![0; width * size.1 as usize * 4];
     finest.par_chunks_mut(width * 4).enumerate().for_each(|(y, row)| {
         let mut planes = vec![0.0; width * 4];
-        source.row(y as u32, &mut planes);
+        source.row(y as u32, 0, planes.chunks_exact_mut(width));
         quantise_row(&planes, transfer, row);
     });
     let bands = reduce_levels(&source, size, kernel, wrap, |band| {

@@ -189,6 +189,33 @@ fn any_maps(seed: u64, width: u32, height: u32, kind: u32, wrap: Wrap) -> Surfac
     SurfaceMaps { normal, roughness, wrap: [wrap, Wrap::Repeat] }
 }
 
+/// All filters' levels hold unit normals with z >= 0 and roughness with eigenvalues in [0, 1].
+fn all_levels_are_sound(maps: &SurfaceMaps, kernel: Kernel) -> Result<(), TestCaseError> {
+    for filter in Filter::ALL {
+        for (level, texels) in levels_of(maps, filter, kernel).iter().enumerate() {
+            for (n, a) in texels {
+                let sound = (n.length() - 1.0).abs() < 1e-5 && n.z >= 0.0;
+                prop_assert!(sound, "{} level {level}: normal {n}", filter.name());
+                // NaN fails every comparison.
+                let (half, radius) = (0.5 * a.trace(), (0.5 * (a.xx - a.yy)).hypot(a.xy));
+                let sound = half - radius >= -1e-6 && half + radius <= 1.0 + 1e-5;
+                prop_assert!(sound, "{} level {level}: {a:?}", filter.name());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Smooth texels with normals on the horizon, one in 20 000 of those tried: the likelihood is highest at a single
+/// microfacet.
+#[test]
+fn one_microfacet_outweighs_a_footprint() {
+    for (seed, width, height, kind) in [(15968610990201710833, 1, 10, 3), (1087827168487019936, 6, 6, 2)] {
+        let maps = any_maps(seed, width, height, kind, Wrap::Repeat);
+        all_levels_are_sound(&maps, Kernel::Box).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -202,18 +229,7 @@ proptest! {
     ) {
         let maps = any_maps(seed, width, height, kind, WRAPS[wrap]);
         let kernel = KERNELS[usize::from(tent)];
-        for filter in Filter::ALL {
-            for (level, texels) in levels_of(&maps, filter, kernel).iter().enumerate() {
-                for (n, a) in texels {
-                    let sound = (n.length() - 1.0).abs() < 1e-5 && n.z >= 0.0;
-                    prop_assert!(sound, "{} level {level}: normal {n}", filter.name());
-                    // Eigenvalues in [0, 1]; NaN fails every comparison.
-                    let (half, radius) = (0.5 * a.trace(), (0.5 * (a.xx - a.yy)).hypot(a.xy));
-                    let sound = half - radius >= -1e-6 && half + radius <= 1.0 + 1e-5;
-                    prop_assert!(sound, "{} level {level}: {a:?}", filter.name());
-                }
-            }
-        }
+        all_levels_are_sound(&maps, kernel)?;
         let requests = [Sheet::Normal, Sheet::Aniso].map(|sheet| SheetRequest {
             sheet,
             encoding: Encoding { format: Format::Rgba8, encoder: Encoder::Portable, preset: Preset::Fast },
@@ -258,7 +274,7 @@ fn odd_footprints_are_probed_beyond_their_end() {
 fn rough_surfaces_are_flattened() {
     use glam::vec3;
     use kinran_shading::Sym2;
-    for (alpha, kept) in [(0.5, 0.9), (0.8, 0.9), (0.9, 0.9), (0.95, 0.9), (0.99, 0.9), (1.0, 0.75)] {
+    for alpha in [0.5, 0.8, 0.9, 0.95, 0.99, 1.0] {
         let mut random = Random::new(5);
         let texels: Vec<common::Surface> = (0..16 * 16)
             .map(|_| {
@@ -270,7 +286,13 @@ fn rough_surfaces_are_flattened() {
             let (n, _) = common::filtered(&texels, 16, filter);
             let tilt = n.x / n.z / 0.4;
             println!("alpha {alpha}, {}: {tilt:.2} of the tilt", filter.name());
-            assert!(tilt > kept - 1e-3 && tilt < 1.3, "alpha {alpha}, {}: normal {n}", filter.name());
+            // At alpha = 1 the fitted lobe has no direction to speak of.
+            let kept = if filter == Filter::Ml && alpha == 1.0 { 0.79 } else { 0.9 };
+            assert!(
+                tilt > kept && tilt < 1.3,
+                "alpha {alpha}, {}: normal {n} keeps {tilt} of the tilt, wanted {kept} to 1.3",
+                filter.name()
+            );
         }
     }
 }

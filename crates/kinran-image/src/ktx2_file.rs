@@ -6,12 +6,14 @@ use std::path::Path;
 
 use ktx2::dfd::{Basic, Block};
 use ktx2::{Header, Index, KeyValueDataIterator, LevelIndex, SupercompressionScheme};
+use rayon::prelude::*;
 
 use crate::image::check_sides;
 use crate::texture::{full_level_count, level_size};
 use crate::{Error, Format, Level, Texture, Transfer};
 
-/// The bytes of a texture as a KTX2 file.
+/// The bytes of a texture as a KTX2 file. Levels are compressed in parallel, each by itself: the bytes do not
+/// depend on the number of threads.
 ///
 /// `zstd` is the compression level of every mip level's bytes, 1 to 22 (3 is fast and close to the best),
 /// or `None` for plain levels that can be uploaded from the file as they are. The texture's metadata are
@@ -64,19 +66,22 @@ pub fn encode_ktx2(texture: &Texture, zstd: Option<i32>) -> Result<Vec<u8>, Erro
     file.extend(block);
     file.extend(key_values);
 
+    let compressed: Option<Vec<Vec<u8>>> = zstd
+        .map(|quality| {
+            let compress = |(i, level): (usize, &Level)| {
+                zstd::bulk::compress(&level.data, quality)
+                    .map_err(|e| Error::Unsupported(format!("Zstandard failed on level {i}: {e}")))
+            };
+            texture.levels.par_iter().enumerate().map(compress).collect()
+        })
+        .transpose()?;
+
     // Plain levels start at a multiple of their block's size and of 4, compressed ones anywhere.
     let alignment = if zstd.is_some() { 1 } else { texture.format.block_bytes().max(4) };
     for (i, level) in texture.levels.iter().enumerate().rev() {
         file.resize(file.len().next_multiple_of(alignment), 0);
         let start = file.len();
-        match zstd {
-            None => file.extend_from_slice(&level.data),
-            Some(quality) => {
-                let compressed = zstd::bulk::compress(&level.data, quality)
-                    .map_err(|e| Error::Unsupported(format!("Zstandard failed on level {i}: {e}")))?;
-                file.extend(compressed);
-            }
-        }
+        file.extend_from_slice(compressed.as_ref().map_or(&level.data, |levels| &levels[i]));
         let index = LevelIndex {
             byte_offset: start as u64,
             byte_length: (file.len() - start) as u64,

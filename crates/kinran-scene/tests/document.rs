@@ -26,7 +26,12 @@ fn assert_as_valid(pairs: &[(PathBuf, PathBuf)]) {
         .filter_map(|line| line.split(" errors,").next()?.rsplit(' ').next()?.parse().ok())
         .collect();
     let complaint = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(errors.len(), 2 * pairs.len(), "a verdict is missing ({}):\n{report}{complaint}", output.status);
+    assert_eq!(
+        errors.len(),
+        2 * pairs.len(),
+        "a verdict is missing ({}):\n{report}{complaint}",
+        output.status
+    );
     for ((before, after), errors) in pairs.iter().zip(errors.chunks(2)) {
         let (before, after) = (before.display(), after.display());
         assert!(errors[1] <= errors[0], "{before}: {} errors, {after}: {}\n{report}", errors[0], errors[1]);

@@ -8,6 +8,7 @@ use kinran_image::{
     level_size,
 };
 use kinran_shading::Sym2;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::footprint::{Kernel, Taps, footprints};
@@ -134,27 +135,29 @@ pub fn bake_surface(
         let (width, height) = (level_size(size.0, level), level_size(size.1, level));
         let mut data = vec![Vec::new(); requests.len()];
         let mut sums = Sums::default();
-        let mut ndf = (0.0_f64, 0);
+        let mut level_probes = Vec::new();
         for band in bands {
             let (encoded, band_sums, band_probes) = band?;
             for (all, part) in data.iter_mut().zip(encoded) {
                 all.extend(part);
             }
             sums.add(&band_sums);
-            for probe in band_probes.iter().filter(|_| level > 0) {
-                let texels = footprint_texels(
-                    maps,
-                    &columns[level - 1][probe.x as usize],
-                    &rows[level - 1][probe.y as usize],
-                );
-                ndf.0 += f64::from(ndf_error(&texels, (probe.n, probe.a)).powi(2));
-                ndf.1 += 1;
-            }
+            level_probes.extend(band_probes);
         }
+        let ndf: Vec<f64> = level_probes
+            .par_iter()
+            .filter(|_| level > 0)
+            .map(|probe| {
+                let (columns, rows) =
+                    (&columns[level - 1][probe.x as usize], &rows[level - 1][probe.y as usize]);
+                let texels = footprint_texels(maps, columns, rows);
+                f64::from(ndf_error(&texels, (probe.n, probe.a)).powi(2))
+            })
+            .collect();
         for (texture, data) in textures.iter_mut().zip(data) {
             texture.levels.push(Level { width, height, data });
         }
-        let ndf_l2 = if ndf.1 > 0 { (ndf.0 / f64::from(ndf.1)).sqrt() as f32 } else { 0.0 };
+        let ndf_l2 = (ndf.iter().sum::<f64>() / ndf.len().max(1) as f64).sqrt() as f32;
         errors.push(LevelError { width, height, ndf_l2, ..sums.finish() });
     }
     Ok(BakedSurface { textures, levels: errors })

@@ -1,26 +1,28 @@
-//! Eight floats that move together: one output texel a lane.
+//! Sixteen floats that move together: one output texel a lane.
 
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-/// Lanes of an [`F8`].
-pub(crate) const LANES: usize = 8;
+use glam::{Vec3, vec3};
 
-/// Eight floats; every operation is IEEE-exact per lane and never fused, so that all instruction sets give
+/// Lanes of an [`F16`].
+pub(crate) const LANES: usize = 16;
+
+/// Sixteen floats; every operation is IEEE-exact per lane and never fused, so that all instruction sets give
 /// the same bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(align(32))]
-pub(crate) struct F8(pub(crate) [f32; LANES]);
+#[repr(align(64))]
+pub(crate) struct F16(pub(crate) [f32; LANES]);
 
-impl F8 {
+impl F16 {
     #[inline(always)]
     pub(crate) fn splat(v: f32) -> Self {
-        F8([v; LANES])
+        F16([v; LANES])
     }
 
     #[inline(always)]
     pub(crate) fn map(self, f: impl Fn(f32) -> f32) -> Self {
-        F8(from_fn(|l| f(self.0[l])))
+        F16(from_fn(|l| f(self.0[l])))
     }
 
     #[inline(always)]
@@ -41,59 +43,64 @@ impl F8 {
 
 macro_rules! lane_wise {
     ($($op:ident $method:ident),*) => {$(
-        impl $op for F8 {
-            type Output = F8;
+        impl $op for F16 {
+            type Output = F16;
             #[inline(always)]
-            fn $method(self, o: F8) -> F8 {
-                F8(from_fn(|l| self.0[l].$method(o.0[l])))
+            fn $method(self, o: F16) -> F16 {
+                F16(from_fn(|l| self.0[l].$method(o.0[l])))
             }
         }
     )*};
 }
 lane_wise!(Add add, Sub sub, Mul mul, Div div);
 
-impl AddAssign for F8 {
+impl AddAssign for F16 {
     #[inline(always)]
-    fn add_assign(&mut self, o: F8) {
+    fn add_assign(&mut self, o: F16) {
         *self = *self + o;
     }
 }
 
-impl Neg for F8 {
-    type Output = F8;
+impl Neg for F16 {
+    type Output = F16;
     #[inline(always)]
-    fn neg(self) -> F8 {
+    fn neg(self) -> F16 {
         self.map(|v| -v)
     }
 }
 
-/// Eight vectors.
+/// Sixteen vectors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct V8 {
-    pub(crate) x: F8,
-    pub(crate) y: F8,
-    pub(crate) z: F8,
+pub(crate) struct V16 {
+    pub(crate) x: F16,
+    pub(crate) y: F16,
+    pub(crate) z: F16,
 }
 
-impl V8 {
+impl V16 {
     #[inline(always)]
-    pub(crate) fn dot(self, o: V8) -> F8 {
+    pub(crate) fn dot(self, o: V16) -> F16 {
         self.x * o.x + self.y * o.y + self.z * o.z
     }
-}
 
-impl Add for V8 {
-    type Output = V8;
     #[inline(always)]
-    fn add(self, o: V8) -> V8 {
-        V8 { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
+    pub(crate) fn lane(self, l: usize) -> Vec3 {
+        vec3(self.x.0[l], self.y.0[l], self.z.0[l])
     }
 }
 
-impl Mul<F8> for V8 {
-    type Output = V8;
+impl Add for V16 {
+    type Output = V16;
     #[inline(always)]
-    fn mul(self, s: F8) -> V8 {
-        V8 { x: self.x * s, y: self.y * s, z: self.z * s }
+    fn add(self, o: V16) -> V16 {
+        V16 { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
+    }
+}
+
+impl Mul<F16> for V16 {
+    type Output = V16;
+    #[inline(always)]
+    fn mul(self, s: F16) -> V16 {
+        V16 { x: self.x * s, y: self.y * s, z: self.z * s }
     }
 }

@@ -12,7 +12,7 @@ use super::footprint::{Kernel, Taps, footprints};
 use super::maps::{SurfaceMaps, TexelSpan, clamp_roughness};
 use super::moments::{LeanFilter, LinearFilter, MOMENTS, MomentFilter, NaiveFilter};
 use super::{ml, param};
-use crate::mips::{BAND_ROWS, PlaneBand, PlaneRows, reduce_levels};
+use crate::mips::{BAND_ROWS, PlaneBand, PlaneRows, TILE, reduce_levels};
 
 /// How a footprint of level 0 becomes one texel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -111,26 +111,26 @@ fn in_bands<T: Send>(size: (u32, u32), level: usize, band: impl Fn(Band) -> T + 
         .collect()
 }
 
-/// Columns of level 0 decoded at a time: six arrays of this many floats stay in the first-level cache.
-const SPAN: usize = 512;
-
 /// Level 0 as the averages of a filter.
 struct MomentRows<'a, F> {
     maps: &'a SurfaceMaps,
+    size: (u32, u32),
     filter: PhantomData<F>,
 }
 
 impl<F: MomentFilter> PlaneRows for MomentRows<'_, F> {
     const PLANES: usize = MOMENTS;
+    type Scratch = TexelSpan;
 
     #[inline(always)]
-    fn add_row(&self, y: u32, weight: f32, sums: &mut [f32]) {
-        let size = self.maps.size();
-        let width = size.0 as usize;
-        let mut span = TexelSpan::default();
-        for x0 in (0..width).step_by(SPAN) {
-            self.maps.decode_span(size, y, x0 as u32, SPAN.min(width - x0), &mut span);
-            add_moments::<F>(&span, weight, sums, width, x0);
+    fn sum_rows(&self, rows: &Taps, x0: usize, len: usize, span: &mut TexelSpan, sums: &mut [[f32; TILE]]) {
+        for (k, &(y, weight)) in rows.iter().enumerate() {
+            self.maps.decode_span(self.size, y, x0 as u32, len, span);
+            if k == 0 {
+                add_moments::<F>(span, weight, sums, |_, m| m);
+            } else {
+                add_moments::<F>(span, weight, sums, |sum, m| sum + m);
+            }
         }
     }
 }
@@ -141,10 +141,9 @@ fn moment_levels<F: MomentFilter, T: Send>(
     kernel: Kernel,
     consume: &(impl Fn(Band) -> T + Sync),
 ) -> Vec<Vec<T>> {
-    let source = MomentRows::<F> { maps, filter: PhantomData };
-    reduce_levels(&source, maps.size(), kernel, maps.wrap, |planes| {
-        let mut texels = TexelSpan::default();
-        texels.resize(planes.width * planes.rows);
+    let source = MomentRows::<F> { maps, size: maps.size(), filter: PhantomData };
+    reduce_levels(&source, source.size, kernel, maps.wrap, |planes| {
+        let mut texels = TexelSpan::with_capacity(planes.width * planes.rows);
         pulp::Arch::new().dispatch(ExtractBand::<F> {
             planes: &planes,
             texels: &mut texels,
@@ -173,56 +172,49 @@ impl<F: MomentFilter> pulp::WithSimd for ExtractBand<'_, F> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let width = self.planes.width;
-        for (y, moments) in self.planes.samples.chunks_exact(width * MOMENTS).enumerate() {
-            extract_row::<F>(moments, width, y, self.texels);
+        let mut padded = [[0.0; TILE]; MOMENTS];
+        let mut tile = [[0.0; TILE]; 6];
+        for row in self.planes.samples.chunks_exact(width * MOMENTS) {
+            for x0 in (0..width).step_by(TILE) {
+                let len = TILE.min(width - x0);
+                let mut averages = [&[0.0; TILE]; MOMENTS];
+                for ((average, padded), plane) in
+                    averages.iter_mut().zip(&mut padded).zip(row.chunks_exact(width))
+                {
+                    let plane = &plane[x0..x0 + len];
+                    *average = plane.try_into().unwrap_or_else(|_| {
+                        padded[..len].copy_from_slice(plane);
+                        &*padded
+                    });
+                }
+                F::surfaces(averages, &mut tile);
+                let [nx, ny, nz, axx, axy, ayy] = &mut tile;
+                clamp_roughness(&mut axx[..len], &mut axy[..len], &mut ayy[..len]);
+                self.texels.extend([nx, ny, nz, axx, axy, ayy].map(|plane| &plane[..len]));
+            }
         }
     }
 }
 
-/// Adds the weighted moments of a decoded span to the sums of its columns.
+/// Adds the weighted moments of a decoded span to the sums of its columns, as `add` says.
 #[inline(always)]
-fn add_moments<F: MomentFilter>(span: &TexelSpan, weight: f32, sums: &mut [f32], width: usize, x0: usize) {
-    let len = span.len();
-    let mut planes = sums.chunks_exact_mut(width).map(|plane| &mut plane[x0..x0 + len]);
-    let [Some(p0), Some(p1), Some(p2), Some(p3), Some(p4), Some(p5), Some(p6), Some(p7), Some(p8)] =
-        std::array::from_fn(|_| planes.next())
-    else {
-        return;
-    };
+fn add_moments<F: MomentFilter>(
+    span: &TexelSpan,
+    weight: f32,
+    sums: &mut [[f32; TILE]],
+    add: impl Fn(f32, f32) -> f32,
+) {
+    let Ok(sums): Result<&mut [[f32; TILE]; MOMENTS], _> = sums.try_into() else { return };
+    let len = span.len().min(TILE);
     let (nx, ny, nz) = (&span.nx[..len], &span.ny[..len], &span.nz[..len]);
     let (axx, axy, ayy) = (&span.axx[..len], &span.axy[..len], &span.ayy[..len]);
     for i in 0..len {
         let a = Sym2 { xx: axx[i], xy: axy[i], yy: ayy[i] };
         let m = F::moments(vec3(nx[i], ny[i], nz[i]), a);
-        p0[i] += m[0] * weight;
-        p1[i] += m[1] * weight;
-        p2[i] += m[2] * weight;
-        p3[i] += m[3] * weight;
-        p4[i] += m[4] * weight;
-        p5[i] += m[5] * weight;
-        p6[i] += m[6] * weight;
-        p7[i] += m[7] * weight;
-        p8[i] += m[8] * weight;
+        for (sums, m) in sums.iter_mut().zip(m) {
+            sums[i] = add(sums[i], m * weight);
+        }
     }
-}
-
-/// Turns one row of averages into row `y` of a band.
-#[inline(always)]
-fn extract_row<F: MomentFilter>(moments: &[f32], width: usize, y: usize, texels: &mut TexelSpan) {
-    let plane = |k: usize| &moments[k * width..(k + 1) * width];
-    let (p0, p1, p2, p3, p4, p5) = (plane(0), plane(1), plane(2), plane(3), plane(4), plane(5));
-    let (p6, p7, p8) = (plane(6), plane(7), plane(8));
-    let range = y * width..(y + 1) * width;
-    let TexelSpan { nx, ny, nz, axx, axy, ayy, .. } = texels;
-    let (nx, ny, nz) = (&mut nx[range.clone()], &mut ny[range.clone()], &mut nz[range.clone()]);
-    let (axx, axy, ayy) = (&mut axx[range.clone()], &mut axy[range.clone()], &mut ayy[range]);
-    for i in 0..width {
-        let (n, a) = F::surface([p0[i], p1[i], p2[i], p3[i], p4[i], p5[i], p6[i], p7[i], p8[i]]);
-        (nx[i], ny[i], nz[i]) = (n.x, n.y, n.z);
-        (axx[i], axy[i], ayy[i]) = (a.xx, a.xy, a.yy);
-    }
-
-    clamp_roughness(axx, axy, ayy);
 }
 
 /// Levels fitted footprint by footprint from level 0.

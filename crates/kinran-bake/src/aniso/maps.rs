@@ -10,7 +10,7 @@ use kinran_shading::{
     aniso_from_alphas, axis_from_direction, normal_from_xy,
 };
 
-use crate::channels::{Place, read_channel};
+use crate::channels::{Place, read_channel, read_channels};
 
 /// A scalar map: one channel of an image times a factor, or the factor alone.
 #[derive(Clone, Debug)]
@@ -144,14 +144,24 @@ impl TexelSpan {
         self.nx.is_empty()
     }
 
+    /// Room for `len` texels.
+    pub(crate) fn with_capacity(len: usize) -> Self {
+        let [nx, ny, nz, axx, axy, ayy] = std::array::from_fn(|_| Vec::with_capacity(len));
+        TexelSpan { nx, ny, nz, axx, axy, ayy, ..TexelSpan::default() }
+    }
+
     /// Appends the texels of another span.
     pub fn append(&mut self, other: &TexelSpan) {
-        self.nx.extend_from_slice(&other.nx);
-        self.ny.extend_from_slice(&other.ny);
-        self.nz.extend_from_slice(&other.nz);
-        self.axx.extend_from_slice(&other.axx);
-        self.axy.extend_from_slice(&other.axy);
-        self.ayy.extend_from_slice(&other.ayy);
+        self.extend([&other.nx, &other.ny, &other.nz, &other.axx, &other.axy, &other.ayy]);
+    }
+
+    /// Appends texels `[nx, ny, nz, axx, axy, ayy]`.
+    #[inline(always)]
+    pub(crate) fn extend(&mut self, texels: [&[f32]; 6]) {
+        let TexelSpan { nx, ny, nz, axx, axy, ayy, .. } = self;
+        for (v, more) in [nx, ny, nz, axx, axy, ayy].into_iter().zip(texels) {
+            v.extend_from_slice(more);
+        }
     }
 
     /// The normal of texel `i` and its squared roughness.
@@ -221,8 +231,7 @@ impl SurfaceMaps {
             span.nz.fill(1.0);
             return;
         };
-        read_channel(image, 0, at, &mut span.nx);
-        read_channel(image, 1, at, &mut span.ny);
+        read_channels(image, [0, 1], at, [&mut span.nx, &mut span.ny]);
         let (gain, offset) = if self.normal.signed { (1.0, 0.0) } else { (2.0, -1.0) };
         let (y_gain, y_offset) = if self.normal.y_down { (-gain, -offset) } else { (gain, offset) };
         let scale = self.normal.scale;
@@ -305,17 +314,19 @@ impl SurfaceMaps {
                 }
             }
             RoughnessMaps::Encoded(image) => {
-                read_channel(image, 0, at, p);
-                read_channel(image, 1, at, q);
-                read_channel(image, 2, at, r);
+                read_channels(image, [0, 1, 2], at, [&mut *p, &mut *q, &mut *r]);
+                let mut any = 0;
                 for i in 0..len {
                     let texel =
                         vec3(p[i].clamp(ALPHA_MIN, 1.0), q[i].clamp(0.0, 1.0), r[i].clamp(ALPHA_MIN, 1.0));
                     let a = aniso_decode_matrix(texel);
                     (axx[i], axy[i], ayy[i]) = (a.xx, a.xy, a.yy);
+                    any |= u32::from((1.0 - a.xx) * (1.0 - a.yy) < a.xy * a.xy);
                 }
                 // A texel with a correlation may be rougher than alpha = 1.
-                clamp_roughness(axx, axy, ayy);
+                if any != 0 {
+                    clamp_roughness(axx, axy, ayy);
+                }
             }
         }
     }

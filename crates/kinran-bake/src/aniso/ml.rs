@@ -24,13 +24,13 @@ use std::array::from_fn;
 
 use glam::{Mat3, Vec2, Vec3, vec2, vec3};
 use kinran_shading::{
-    Sym2, Sym3, UNIT_SLOPES, ggx_from_sggx_unclamped, m_n, microfacet_basis, sggx_from_slopes,
-    slopes_from_sggx,
+    Sym2, Sym3, UNIT_SLOPES, m_n, microfacet_basis, sggx_from_slopes, sggx_principal_axis, slopes_from_sggx,
 };
 
 use super::footprint::Taps;
-use super::lanes::{F8, LANES, V8};
+use super::lanes::{F16, LANES, V16};
 use super::maps::{SurfaceMaps, TexelSpan};
+use super::moments::{sggx_normals, sggx_roughness};
 
 /// Texels of a footprint looked at along each axis. Longer footprints are cut into this many strata and one
 /// texel is drawn from each, at a different place in every row so that no weave lines up with it.
@@ -55,6 +55,10 @@ const MIN_A: f32 = 2.4e-7;
 /// Smallest cosine to n0 at which a microfacet still has a slope; chosen by eye.
 const MIN_COSINE: f32 = 1e-3;
 
+/// Smallest eigenvalue of a normal, as a share of the SGGX matrix's trace: ten times the rounding of single
+/// precision.
+const MIN_AREA: f32 = 1e-6;
+
 /// Fits one row of a level: `columns` are the footprints of its texels along x, `rows` the one along y.
 pub(crate) fn fit_row(maps: &SurfaceMaps, columns: &[Taps], rows: &Taps, out: &mut TexelSpan) {
     pulp::Arch::new().dispatch(FitRow { maps, columns, rows, out });
@@ -71,8 +75,8 @@ struct FitRow<'a> {
 #[derive(Clone, Copy, Default)]
 struct Sample {
     /// Images of the unit slopes' axes, and the normal: `h = p X + q Y + n`.
-    basis: [V8; 3],
-    weight: F8,
+    basis: [V16; 3],
+    weight: F16,
     /// First of the microfacets of [`UNIT_SLOPES`] used, see [`microfacets_of`].
     pattern: usize,
 }
@@ -80,14 +84,15 @@ struct Sample {
 /// One microfacet of each lane's footprint in the frame of the lane's n0.
 #[derive(Clone, Copy, Default)]
 struct Microfacet {
-    x: F8,
-    y: F8,
-    weight: F8,
+    x: F16,
+    y: F16,
+    weight: F16,
 }
 
 #[derive(Default)]
 struct Scratch {
     block: Block,
+    picks: Vec<([u32; LANES], F16)>,
     samples: Vec<Sample>,
     microfacets: Vec<Microfacet>,
 }
@@ -156,9 +161,10 @@ impl Block {
         let salt = |j| j as u32 * 977 + rows[0].0;
         self.rows.extend(strata(rows).enumerate().map(|(j, stratum)| draw(rows, stratum, salt(j))));
         self.bases.resize(self.rows.len() * self.len, [0.0; 9]);
+        let size = maps.size();
         for (j, &(row, _)) in self.rows.iter().enumerate() {
             let span = if j == 0 { &mut self.top } else { &mut self.span };
-            maps.decode_span(maps.size(), row, self.first, self.len, span);
+            maps.decode_span(size, row, self.first, self.len, span);
             let (nx, ny, nz) = (&span.nx[..self.len], &span.ny[..self.len], &span.nz[..self.len]);
             let (axx, axy, ayy) = (&span.axx[..self.len], &span.axy[..self.len], &span.ayy[..self.len]);
             let bases = &mut self.bases[j * self.len..(j + 1) * self.len];
@@ -201,8 +207,8 @@ fn microfacet<const COUNT: usize>(pattern: usize, k: usize) -> Vec2 {
 #[inline(always)]
 fn fit_group(columns: &[Taps], x0: usize, scratch: &mut Scratch, out: &mut TexelSpan) {
     let lane_columns: [&Taps; LANES] = from_fn(|l| &columns[l.min(columns.len() - 1)]);
-    let Scratch { block, samples, microfacets } = scratch;
-    gather(block, lane_columns, samples);
+    let Scratch { block, picks, samples, microfacets } = scratch;
+    gather(block, lane_columns, picks, samples);
     let (sums, mean) = linear_sums(samples);
     let (frame, start) = linear_frames(&sums, &mean);
     match microfacets_per_texel(samples.len()) {
@@ -219,7 +225,7 @@ fn fit_group(columns: &[Taps], x0: usize, scratch: &mut Scratch, out: &mut Texel
     for (l, constant) in constant.iter().enumerate().take(columns.len()) {
         let (n, a) = constant.unwrap_or_else(|| {
             let a = Sym2 { xx: roughness[0].0[l], xy: roughness[1].0[l], yy: roughness[2].0[l] };
-            (vec3(normals.x.0[l], normals.y.0[l], normals.z.0[l]), a.clamp_eigen(0.0, 1.0))
+            (normals.lane(l), a.clamp_eigen(0.0, 1.0))
         });
         out.set(x0 + l, n, a);
     }
@@ -262,41 +268,60 @@ fn pattern(i: usize, j: usize) -> usize {
     b0 | b1 << 1 | b2 << 2 | b3 << 3
 }
 
-/// Collects the texels of eight footprints.
+/// Tap `i` of each lane's footprint in row `row`, from the block's first column on, and its weight.
 #[inline(always)]
-fn gather(block: &Block, columns: [&Taps; LANES], samples: &mut Vec<Sample>) {
-    let per_row = columns.iter().map(|taps| taps.len().min(MAX_AXIS_TEXELS)).max().unwrap_or(0);
+fn pick(block: &Block, columns: [&Taps; LANES], row: u32, i: usize) -> ([u32; LANES], F16) {
+    let mut picked = ([0; LANES], F16::default());
+    for (l, taps) in columns.iter().enumerate() {
+        // Shorter footprints, next to a longer one of an odd-sized level, repeat a texel without weight.
+        let (column, weight) = if taps.len() <= MAX_AXIS_TEXELS {
+            taps.get(i).copied().unwrap_or((taps[0].0, 0.0))
+        } else {
+            let stratum = (i * taps.len() / MAX_AXIS_TEXELS, (i + 1) * taps.len() / MAX_AXIS_TEXELS);
+            draw(taps, stratum, row * 131 + i as u32)
+        };
+        (picked.0[l], picked.1.0[l]) = (column - block.first, weight);
+    }
+    picked
+}
+
+/// Collects the texels of a group's footprints.
+#[inline(always)]
+fn gather(
+    block: &Block,
+    columns: [&Taps; LANES],
+    picks: &mut Vec<([u32; LANES], F16)>,
+    samples: &mut Vec<Sample>,
+) {
+    let longest = columns.iter().map(|taps| taps.len()).max().unwrap_or(0);
     samples.clear();
     for (j, &(row, row_weight)) in block.rows.iter().enumerate() {
+        // Taps that are drawn are others in every row.
+        if j == 0 || longest > MAX_AXIS_TEXELS {
+            picks.clear();
+            picks.extend((0..longest.min(MAX_AXIS_TEXELS)).map(|i| pick(block, columns, row, i)));
+        }
         let bases = &block.bases[j * block.len..(j + 1) * block.len];
-        for i in 0..per_row {
-            let pattern = pattern(i, j);
-            let mut sample = Sample { pattern, ..Sample::default() };
-            for (l, taps) in columns.iter().enumerate() {
-                // Shorter footprints, next to a longer one of an odd-sized level, repeat a texel without weight.
-                let (column, weight) = if taps.len() <= MAX_AXIS_TEXELS {
-                    taps.get(i).copied().unwrap_or((taps[0].0, 0.0))
-                } else {
-                    let stratum = (i * taps.len() / MAX_AXIS_TEXELS, (i + 1) * taps.len() / MAX_AXIS_TEXELS);
-                    draw(taps, stratum, row * 131 + i as u32)
-                };
-                let basis = &bases[(column - block.first) as usize];
-                for (axis, v) in sample.basis.iter_mut().zip(basis.chunks_exact(3)) {
-                    (axis.x.0[l], axis.y.0[l], axis.z.0[l]) = (v[0], v[1], v[2]);
+        for (i, (column, weight)) in picks.iter().enumerate() {
+            let mut basis = [V16::default(); 3];
+            for (l, &column) in column.iter().enumerate() {
+                let v = &bases[column as usize];
+                for (k, axis) in basis.iter_mut().enumerate() {
+                    (axis.x.0[l], axis.y.0[l], axis.z.0[l]) = (v[3 * k], v[3 * k + 1], v[3 * k + 2]);
                 }
-                sample.weight.0[l] = weight * row_weight;
             }
-            samples.push(sample);
+            let weight = *weight * F16::splat(row_weight);
+            samples.push(Sample { basis, weight, pattern: pattern(i, j) });
         }
     }
 }
 
 /// The linear filter's averages, `[xx, xy, xz, yy, yz, zz]` of the matrix and the normal.
 #[inline(always)]
-fn linear_sums(samples: &[Sample]) -> ([F8; 6], V8) {
+fn linear_sums(samples: &[Sample]) -> ([F16; 6], V16) {
     // M_n A M_n^T + n n^T, since the basis holds the columns of M_n A^(1/2) and n.
-    let mut sums = [F8::default(); 6];
-    let mut mean = V8::default();
+    let mut sums = [F16::default(); 6];
+    let mut mean = V16::default();
     for sample in samples {
         let [p, q, n] = &sample.basis;
         let w = sample.weight;
@@ -310,26 +335,31 @@ fn linear_sums(samples: &[Sample]) -> ([F8; 6], V8) {
     }
     // Opposite normals on the horizon leave nothing but rounding, which is z here.
     mean.z = mean.z.max(1e-6);
-    let length = F8(from_fn(|l| mean.dot(mean).0[l].sqrt()));
+    let length = F16(from_fn(|l| mean.dot(mean).0[l].sqrt()));
     (sums, mean * length.recip())
 }
 
 /// The columns of `M_n0` of the linear results' normals, and their squared roughness as slopes seen from n0,
 /// `[xx, xy, yy]`.
 #[inline(always)]
-fn linear_frames(sums: &[F8; 6], mean: &V8) -> ([V8; 3], [F8; 3]) {
-    let mut frame = [V8::default(); 3];
-    let mut roughness = [F8::default(); 3];
+fn linear_frames(sums: &[F16; 6], mean: &V16) -> ([V16; 3], [F16; 3]) {
+    let mut n = *mean;
+    sggx_normals(sums.each_ref().map(|v| &v.0), [&mut n.x.0, &mut n.y.0, &mut n.z.0]);
+
+    let mut frame = [V16::default(); 3];
+    let mut roughness = [F16::default(); 3];
+    let [x, y, z] = &mut frame;
+    let [axx, axy, ayy] = &mut roughness;
+    let [xx, xy, xz, yy, yz, zz] = sums;
     for l in 0..LANES {
-        let [xx, xy, xz, yy, yz, zz] = [0, 1, 2, 3, 4, 5].map(|k| sums[k].0[l]);
-        let s = Sym3 { xx, xy, xz, yy, yz, zz };
-        let start = vec3(mean.x.0[l], mean.y.0[l], mean.z.0[l]);
-        let m = m_n(ggx_from_sggx_unclamped(s, start).0);
-        for (axis, v) in frame.iter_mut().zip([m.x_axis, m.y_axis, m.z_axis]) {
-            (axis.x.0[l], axis.y.0[l], axis.z.0[l]) = (v.x, v.y, v.z);
-        }
-        let a = slopes_from_sggx(s.in_frame(m)).1;
-        (roughness[0].0[l], roughness[1].0[l], roughness[2].0[l]) = (a.xx, a.xy, a.yy);
+        let m = m_n(n.lane(l));
+        (x.x.0[l], x.y.0[l], x.z.0[l]) = (m.x_axis.x, m.x_axis.y, m.x_axis.z);
+        (y.x.0[l], y.y.0[l], y.z.0[l]) = (m.y_axis.x, m.y_axis.y, m.y_axis.z);
+        (z.x.0[l], z.y.0[l], z.z.0[l]) = (m.z_axis.x, m.z_axis.y, m.z_axis.z);
+        let s =
+            Sym3 { xx: xx.0[l], xy: xy.0[l], xz: xz.0[l], yy: yy.0[l], yz: yz.0[l], zz: zz.0[l] }.in_frame(m);
+        let a = slopes_from_sggx(s).1;
+        (axx.0[l], axy.0[l], ayy.0[l]) = (a.xx, a.xy, a.yy);
     }
     (frame, roughness)
 }
@@ -337,19 +367,44 @@ fn linear_frames(sums: &[F8; 6], mean: &V8) -> ([V8; 3], [F8; 3]) {
 /// Normals and squared roughness `[xx, xy, yy]` of slope distributions seen in the lanes' frames; eigenvalues
 /// may exceed one.
 #[inline(always)]
-fn surfaces(frame: &[V8; 3], mean: &V8, m: [F8; 2], a: [F8; 3]) -> (V8, [F8; 3]) {
-    let mut normals = V8::default();
-    let mut roughness = [F8::default(); 3];
+fn surfaces(frame: &[V16; 3], mean: &V16, m: [F16; 2], a: [F16; 3]) -> (V16, [F16; 3]) {
+    let mut matrices = [F16::default(); 6];
+    let [xx, xy, xz, yy, yz, zz] = &mut matrices;
+    let [x, y, z] = frame;
     for l in 0..LANES {
-        let [x, y, z] = [0, 1, 2].map(|k| vec3(frame[k].x.0[l], frame[k].y.0[l], frame[k].z.0[l]));
         let a = Sym2 { xx: a[0].0[l], xy: a[1].0[l], yy: a[2].0[l] };
         let slopes = sggx_from_slopes(vec2(m[0].0[l], m[1].0[l]), a);
-        let start = vec3(mean.x.0[l], mean.y.0[l], mean.z.0[l]);
-        let (n, a) = ggx_from_sggx_unclamped(slopes.in_frame(Mat3::from_cols(x, y, z).transpose()), start);
-        (normals.x.0[l], normals.y.0[l], normals.z.0[l]) = (n.x, n.y, n.z);
-        (roughness[0].0[l], roughness[1].0[l], roughness[2].0[l]) = (a.xx, a.xy, a.yy);
+        let transposed = Mat3::from_cols(
+            vec3(x.x.0[l], y.x.0[l], z.x.0[l]),
+            vec3(x.y.0[l], y.y.0[l], z.y.0[l]),
+            vec3(x.z.0[l], y.z.0[l], z.z.0[l]),
+        );
+        let s = slopes.in_frame(transposed);
+        (xx.0[l], xy.0[l], xz.0[l]) = (s.xx, s.xy, s.xz);
+        (yy.0[l], yz.0[l], zz.0[l]) = (s.yy, s.yz, s.zz);
     }
-    (normals, roughness)
+
+    let [xx, xy, xz, yy, yz, zz] = &matrices;
+    let mut n = *mean;
+    sggx_normals(matrices.each_ref().map(|v| &v.0), [&mut n.x.0, &mut n.y.0, &mut n.z.0]);
+    for l in 0..LANES {
+        let s = Sym3 { xx: xx.0[l], xy: xy.0[l], xz: xz.0[l], yy: yy.0[l], yz: yz.0[l], zz: zz.0[l] };
+        // Where a single microfacet outweighs its footprint, the mean normal may lie in the plane of eigenvalue
+        // zero. The microfacet of mean slope has no part in it.
+        if s.quadratic(n.lane(l)) < MIN_AREA * s.trace() {
+            let centre = (frame[0] * m[0] + frame[1] * m[1] + frame[2]).lane(l).normalize();
+            let axis = sggx_principal_axis(s, centre);
+            (n.x.0[l], n.y.0[l], n.z.0[l]) = (axis * 1.0_f32.copysign(axis.z)).into();
+        }
+    }
+
+    let mut roughness = [F16::default(); 3];
+    sggx_roughness(
+        matrices.each_ref().map(|v| &v.0),
+        [&n.x.0, &n.y.0, &n.z.0],
+        roughness.each_mut().map(|v| &mut v.0),
+    );
+    (n, roughness)
 }
 
 /// The one texel that a lane's footprint consists of, where it is constant: it comes out as it went in.
@@ -359,7 +414,7 @@ fn constant_texels(
     columns: [&Taps; LANES],
     samples: &[Sample],
 ) -> [Option<(Vec3, Sym2)>; LANES] {
-    let mut change = F8::default();
+    let mut change = F16::default();
     for sample in samples {
         for (axis, first) in sample.basis.iter().zip(&samples[0].basis) {
             change += (axis.x - first.x).abs() + (axis.y - first.y).abs() + (axis.z - first.z).abs();
@@ -373,14 +428,14 @@ fn constant_texels(
 
 /// Turns the samples into microfacets, `COUNT` each, seen in the lanes' frames.
 #[inline(always)]
-fn scatter<const COUNT: usize>(samples: &[Sample], frame: &[V8; 3], microfacets: &mut Vec<Microfacet>) {
+fn scatter<const COUNT: usize>(samples: &[Sample], frame: &[V16; 3], microfacets: &mut Vec<Microfacet>) {
     microfacets.clear();
     for sample in samples {
         let [x, y, n] =
-            sample.basis.map(|v| V8 { x: v.dot(frame[0]), y: v.dot(frame[1]), z: v.dot(frame[2]) });
+            sample.basis.map(|v| V16 { x: v.dot(frame[0]), y: v.dot(frame[1]), z: v.dot(frame[2]) });
         for k in 0..COUNT {
             let slope = microfacet::<COUNT>(sample.pattern, k);
-            let h = x * F8::splat(slope.x) + y * F8::splat(slope.y) + n;
+            let h = x * F16::splat(slope.x) + y * F16::splat(slope.y) + n;
             // Microfacets that n0 cannot see have no slope; they weigh nothing.
             let inv = h.z.max(MIN_COSINE).recip();
             let weight = h.z.max(0.0) * sample.weight;
@@ -391,8 +446,8 @@ fn scatter<const COUNT: usize>(samples: &[Sample], frame: &[V8; 3], microfacets:
 
 /// The fixed point of the iteration: mean slopes and squared roughness `[xx, xy, yy]`.
 #[inline(always)]
-fn maximise(microfacets: &[Microfacet], start: [F8; 3]) -> ([F8; 2], [F8; 3]) {
-    let mut m = [F8::default(); 2];
+fn maximise(microfacets: &[Microfacet], start: [F16; 3]) -> ([F16; 2], [F16; 3]) {
+    let mut m = [F16::default(); 2];
     let mut a = start;
     for _ in 0..MAX_STEPS {
         // Inverse of A, kept away from singular.
@@ -401,11 +456,12 @@ fn maximise(microfacets: &[Microfacet], start: [F8; 3]) -> ([F8; 2], [F8; 3]) {
         let inv_det = det.recip();
         let (ixx, ixy, iyy) = (yy * inv_det, -(a[1] + a[1]) * inv_det, xx * inv_det);
 
-        let mut sum = [F8::default(); 6];
+        let mut sum = [F16::default(); 6];
         for h in microfacets {
             let (x, y) = (h.x - m[0], h.y - m[1]);
-            let q = x * (x * ixx + y * ixy) + y * y * iyy;
-            let u = h.weight / (F8::splat(1.0) + q);
+            // Rounding can take it below zero where A is all but singular, and a weight at -1 has no bound.
+            let q = (x * (x * ixx + y * ixy) + y * y * iyy).max(0.0);
+            let u = h.weight / (F16::splat(1.0) + q);
             let (ux, uy) = (u * x, u * y);
             sum[0] += u;
             sum[1] += ux;
@@ -418,11 +474,11 @@ fn maximise(microfacets: &[Microfacet], start: [F8; 3]) -> ([F8; 2], [F8; 3]) {
         // The sums are about the old mean; the moments about the new one follow by the shift.
         let inv = sum[0].max(f32::MIN_POSITIVE).recip();
         let (dx, dy) = (sum[1] * inv, sum[2] * inv);
-        let two = F8::splat(2.0);
+        let two = F16::splat(2.0);
         let next =
             [two * (sum[3] * inv - dx * dx), two * (sum[4] * inv - dx * dy), two * (sum[5] * inv - dy * dy)];
         m = [m[0] + dx, m[1] + dy];
-        let tolerance = (next[0] + next[2]) * F8::splat(CONVERGED);
+        let tolerance = (next[0] + next[2]) * F16::splat(CONVERGED);
         let settled = (0..LANES).all(|l| (0..3).all(|k| (next[k].0[l] - a[k].0[l]).abs() <= tolerance.0[l]));
         a = next;
         if settled {

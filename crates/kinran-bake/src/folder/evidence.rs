@@ -1,6 +1,9 @@
 //! What the texels of a normal map tell about it: whether it is one, and which way its green points.
 
+use std::ops::Range;
+
 use kinran_image::{Channels, Image, Pixels};
+use rayon::prelude::*;
 
 use super::Green;
 
@@ -29,7 +32,11 @@ pub enum GreenGuess {
 
 /// Which way green points, judged by [`green_correlation`] against [`GREEN_CONFIDENCE`].
 pub fn guess_green(image: &Image) -> GreenGuess {
-    let correlation = green_correlation(image);
+    guess_by_correlation(green_correlation(image))
+}
+
+/// The answer that a [`green_correlation`] gives.
+pub(super) fn guess_by_correlation(correlation: f64) -> GreenGuess {
     if correlation >= GREEN_CONFIDENCE {
         GreenGuess::Up
     } else if correlation <= -GREEN_CONFIDENCE {
@@ -64,19 +71,23 @@ pub fn green_correlation(image: &Image) -> f64 {
         let z = (1.0 - x * x - y * y).max(0.04).sqrt();
         (-x / z, y / z)
     };
-    let (mut ab, mut aabb) = (0.0, 0.0);
-    let mut rows = [Vec::new(), Vec::new(), Vec::new()];
-    for y in (1..height - 1).step_by(row_step(image)) {
-        for (row, at) in rows.iter_mut().zip([y - 1, y, y + 1]) {
-            image.row_rgba_f32(at as u32, row);
-        }
+    let row_slopes = |y: u32| -> Vec<(f64, f64)> {
+        let mut row = Vec::new();
+        image.row_rgba_f32(y, &mut row);
+        row.iter().map(slopes).collect()
+    };
+    let sums = in_rows(image, 1..image.height - 1, |y| {
+        let rows = [y - 1, y, y + 1].map(|y| row_slopes(y));
+        let (mut ab, mut aabb) = (0.0, 0.0);
         for x in 1..width - 1 {
-            let a = slopes(&rows[2][x]).0 - slopes(&rows[0][x]).0;
-            let b = slopes(&rows[1][x + 1]).1 - slopes(&rows[1][x - 1]).1;
+            let a = rows[2][x].0 - rows[0][x].0;
+            let b = rows[1][x + 1].1 - rows[1][x - 1].1;
             ab += a * b;
             aabb += a * a + b * b;
         }
-    }
+        (ab, aabb)
+    });
+    let (ab, aabb) = sums.iter().fold((0.0, 0.0), |sum, row| (sum.0 + row.0, sum.1 + row.1));
     if aabb > 0.0 { 2.0 * ab / aabb } else { 0.0 }
 }
 
@@ -91,22 +102,23 @@ pub(super) fn not_normals(image: &Image) -> Option<String> {
         return Some("it is grey, a normal map has red and green".into());
     }
     let signed = is_signed(image);
-    let (mut count, mut wrong) = (0usize, 0usize);
-    let mut sum = [0.0f64; 3];
-    let mut row = Vec::new();
-    for y in (0..image.height).step_by(row_step(image)) {
+    let rows = in_rows(image, 0..image.height, |y| {
+        let mut row = Vec::new();
         image.row_rgba_f32(y, &mut row);
+        let (mut wrong, mut sum) = (0usize, [0.0f64; 3]);
         for texel in &row {
             let v = [0, 1, 2].map(|i| component(texel[i], signed));
             let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
             wrong += usize::from((length - 1.0).abs() > 0.25);
-            count += 1;
             for (s, c) in sum.iter_mut().zip(v) {
                 *s += c * 0.5 + 0.5;
             }
         }
-    }
-    let [red, green, blue] = sum.map(|s| s / count as f64);
+        (wrong, sum)
+    });
+    let count = rows.len() * image.width as usize;
+    let wrong: usize = rows.iter().map(|row| row.0).sum();
+    let [red, green, blue] = [0, 1, 2].map(|i| rows.iter().map(|row| row.1[i]).sum::<f64>() / count as f64);
     let share = wrong as f64 / count as f64;
     if share > 0.3 {
         return Some(format!(
@@ -132,16 +144,13 @@ pub(super) fn is_grey(image: &Image) -> bool {
     if image.channels < Channels::Rgb {
         return true;
     }
-    let (mut count, mut colored) = (0usize, 0usize);
-    let mut row = Vec::new();
-    for y in (0..image.height).step_by(row_step(image)) {
+    let is_colored = |[r, g, b, _]: &&[f32; 4]| r.max(*g).max(*b) - r.min(*g).min(*b) > 2.5 / 255.0;
+    let rows = in_rows(image, 0..image.height, |y| {
+        let mut row = Vec::new();
         image.row_rgba_f32(y, &mut row);
-        for [r, g, b, _] in &row {
-            count += 1;
-            colored += usize::from(r.max(*g).max(*b) - r.min(*g).min(*b) > 2.5 / 255.0);
-        }
-    }
-    colored * 100 <= count
+        row.iter().filter(is_colored).count()
+    });
+    rows.iter().sum::<usize>() * 100 <= rows.len() * image.width as usize
 }
 
 fn is_signed(image: &Image) -> bool {
@@ -153,6 +162,9 @@ fn component(sample: f32, signed: bool) -> f64 {
     if signed { sample } else { sample * 2.0 - 1.0 }
 }
 
-fn row_step(image: &Image) -> usize {
-    (image.width as usize * image.height as usize).div_ceil(MAX_LOOKED_AT)
+/// What `look` says of the rows looked at, in parallel and in order.
+fn in_rows<T: Send>(image: &Image, rows: Range<u32>, look: impl Fn(u32) -> T + Sync + Send) -> Vec<T> {
+    let step = (image.width as usize * image.height as usize).div_ceil(MAX_LOOKED_AT);
+    let rows: Vec<u32> = rows.step_by(step).collect();
+    rows.into_par_iter().map(look).collect()
 }

@@ -9,7 +9,7 @@ use kinran_scene::Wrap;
 use kinran_shading::{alpha_from_roughness, alphas_from_khr_anisotropy};
 use rayon::prelude::*;
 
-use super::evidence::{green_correlation, guess_green, is_grey, not_normals};
+use super::evidence::{green_correlation, guess_by_correlation, is_grey, not_normals};
 use super::{
     BaseRoughness, DirectionSource, FolderError, Green, GreenGuess, GreenSource, LevelSource, MapChannel,
     MaterialMaps, NormalSource, Role, RoughnessSource,
@@ -110,9 +110,9 @@ fn normal_map(
         ));
     }
 
-    let guess = guess_green(image);
-    let name = super::file_name(file);
     let correlation = green_correlation(image);
+    let guess = guess_by_correlation(correlation);
+    let name = super::file_name(file);
     match (guess.contradicts(source.green), source.green_source) {
         (true, GreenSource::Assumed) => {
             return Err(unfit(

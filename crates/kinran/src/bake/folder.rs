@@ -4,9 +4,10 @@ use kinran_bake::aniso::{Sheet, SheetRequest, bake_surface};
 use kinran_bake::folder::{Hints, LoadedMaterial, Role as MapRole, scan};
 use kinran_bake::{bake_plain, pack_channels};
 use kinran_image::{Image, Role, Transfer, full_level_count, level_size};
+use rayon::prelude::*;
 
 use super::report::hash_file;
-use super::{Args, Form, Input, Report, SurfaceReport, file_name, file_stem, write_texture};
+use super::{Args, Form, Input, Output, Report, SurfaceReport, file_name, file_stem, write_texture};
 use crate::{Console, Error};
 
 /// Bakes every material found in a folder.
@@ -94,10 +95,13 @@ fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> R
         let stage = console.progress().stage(format!("{} {name}", args.filter.name()), texels);
         let baked = bake_surface(maps, args.options(), &requests, &|texels| stage.add(texels))?;
         report.levels = baked.levels;
-        for (request, texture) in requests.iter().zip(baked.textures) {
-            let map = if request.packed_with.is_some() { "orm" } else { request.sheet.name() };
-            report.outputs.extend(write_texture(args, &format!("{name}_{map}"), map, texture)?);
-        }
+        let written: Vec<Vec<Output>> = (requests.par_iter().zip(baked.textures))
+            .map(|(request, texture)| {
+                let map = if request.packed_with.is_some() { "orm" } else { request.sheet.name() };
+                write_texture(args, &format!("{name}_{map}"), map, texture)
+            })
+            .collect::<Result<_, Error>>()?;
+        report.outputs.extend(written.into_iter().flatten());
     } else if occlusion.is_some() || metallic.is_some() {
         let size = |image: Option<(&Image, usize)>| image.map_or((1, 1), |(i, _)| (i.width, i.height));
         let (o, m) = (size(occlusion), size(metallic));
