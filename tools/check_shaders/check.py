@@ -43,7 +43,7 @@ class Text:
             return [n for i in range(int(array[2])) for n in self.numbers(array[1], f"{value}[{i}]")]
         if type_name in self.structs:
             return [n for member, name in self.structs[type_name] for n in self.numbers(member, f"{value}.{name}")]
-        if re.fullmatch(r"mat3x3|float3x3", type_name):
+        if re.fullmatch(r"mat3|float3x3", type_name):
             return [n for i in range(3) for n in self.numbers("vec3", f"{value}[{i}]")]
         if vector := re.fullmatch(r"(?:vec|float)([234])", type_name):
             return [f"{value}.{c}" for c in "xyzw"[: int(vector[1])]]

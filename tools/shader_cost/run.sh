@@ -3,7 +3,7 @@
 # Usage: tools/shader_cost/run.sh [--check]. Without a flag it writes budget.json and docs/shader_cost.md; with it,
 # it fails where an instruction count has grown. KINRAN_RADV and KINRAN_RADV_NEW name the manifests of two versions of
 # Mesa's RADV; by default the system's, and for RDNA 3, which that of Debian 12 cannot compile for, the one of its
-# backports, unpacked in .tools. KINRAN_BUILT names a folder where the program is built already.
+# backports, unpacked in .tools.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)
@@ -44,10 +44,6 @@ if [ -z "${KINRAN_RADV_NEW:-}" ]; then
     [ ! -d "$mesa" ] || export KINRAN_RADV_NEW=$mesa/radeon_icd.json
 fi
 
-program=${KINRAN_BUILT:-}/shader_cost
-if [ ! -x "$program" ]; then
-    target=$(realpath -m "${CARGO_TARGET_DIR:-$root/target}")
-    cargo build --quiet --release --locked --manifest-path "$here/Cargo.toml" --target-dir "$target"
-    program=$target/release/shader_cost
-fi
-"$program" "$@"
+target=$(realpath -m "${CARGO_TARGET_DIR:-$root/target}")
+cargo build --quiet --release --locked --manifest-path "$here/Cargo.toml" --target-dir "$target"
+"$target/release/shader_cost" "$@"

@@ -71,14 +71,14 @@ vec3 normal_from_slope(vec2 slope) {
 /// is below 1e-6 the half turn about x is returned, whose third column is −z.
 ///
 /// Cost on GCN: 13 instructions (1 at a quarter of the rate).
-mat3x3 m_n(vec3 n) {
+mat3 m_n(vec3 n) {
     float d = 1.0 + n.z;
     if (d < 1e-6) {
-        return mat3x3(vec3(1.0, 0.0, 0.0), vec3(0.0, -1.0, 0.0), vec3(0.0, 0.0, -1.0));
+        return mat3(vec3(1.0, 0.0, 0.0), vec3(0.0, -1.0, 0.0), vec3(0.0, 0.0, -1.0));
     }
     float a = 1.0 / d;
     float xy = (-(n.x) * n.y) * a;
-    return mat3x3(vec3((n.z + ((n.y * n.y) * a)), xy, -(n.x)), vec3(xy, (n.z + ((n.x * n.x) * a)), -(n.y)), n);
+    return mat3(vec3((n.z + ((n.y * n.y) * a)), xy, -(n.x)), vec3(xy, (n.z + ((n.x * n.x) * a)), -(n.y)), n);
 }
 
 /// A unit normal from the xy of a normal map, each in [−1, 1]. Where x² + y² exceeds one, as compression and
@@ -297,28 +297,28 @@ vec3 sym2_sqrt(vec3 a) {
 /// `v^T A v`.
 ///
 /// Cost on GCN: 12 instructions.
-float sym3_quadratic(mat3x3 a, vec3 v) {
+float sym3_quadratic(mat3 a, vec3 v) {
     return dot(v, (a * v));
 }
 
 /// Trace of a 3×3 matrix.
 ///
 /// Cost on GCN: 2 instructions.
-float sym3_trace(mat3x3 a) {
+float sym3_trace(mat3 a) {
     return (a[0].x + a[1].y) + a[2].z;
 }
 
 /// The adjugate of a symmetric matrix: `A adj(A) = det(A) I`. Its columns are the cross products of A's.
 ///
 /// Cost on GCN: 18 instructions.
-mat3x3 sym3_adjugate(mat3x3 a) {
-    return mat3x3(cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]));
+mat3 sym3_adjugate(mat3 a) {
+    return mat3(cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]));
 }
 
 /// Determinant of a symmetric 3×3 matrix.
 ///
 /// Cost on GCN: 9 instructions.
-float sym3_det(mat3x3 a) {
+float sym3_det(mat3 a) {
     return dot(a[0], cross(a[1], a[2]));
 }
 
@@ -391,14 +391,14 @@ vec3 aniso_decode_matrix(vec3 texel) {
 /// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
 /// 0.03° of the exact one.
 ///
-/// Cost on GCN: 36 instructions (5 at a quarter of the rate).
+/// Cost on GCN: 37 instructions (5 at a quarter of the rate).
 AnisoDecoded aniso_decode(vec3 texel, vec3 tangent, vec3 bitangent) {
     float rho = (texel.y * 2.0) - 1.0;
     float product = texel.x * texel.z;
     float sxy = product * rho;
-    float sxx = (texel.x * texel.x) + 1e-12;
+    float sxx = texel.x * texel.x;
     float syy = texel.z * texel.z;
-    float half_difference = 0.5 * (sxx - syy);
+    float half_difference = (0.5 * (sxx - syy)) + 1e-12;
     float discr_sqr = 4.0 * ((half_difference * half_difference) + (sxy * sxy));
     float discr_rcp = inversesqrt(discr_sqr);
     float alpha_t_sqr = 0.5 * ((sxx + syy) + (discr_sqr * discr_rcp));
@@ -426,7 +426,7 @@ vec3 aniso_from_alphas(float alpha_t, float alpha_b, vec2 axis) {
 ///
 /// Cost on GCN: 23 instructions (2 at a quarter of the rate).
 vec2 axis_from_direction(vec2 direction, vec3 n) {
-    mat3x3 _e2 = m_n(n);
+    mat3 _e2 = m_n(n);
     vec2 axis = vec2(dot(_e2[0].xy, direction), dot(_e2[1].xy, direction));
     float length_squared = dot(axis, axis);
     return (length_squared > 1e-12) ? (axis * inversesqrt(length_squared)) : direction;
@@ -437,7 +437,7 @@ vec2 axis_from_direction(vec2 direction, vec3 n) {
 ///
 /// Cost on GCN: 31 instructions (2 at a quarter of the rate).
 vec2 direction_from_axis(vec2 axis, vec3 n) {
-    mat3x3 _e2 = m_n(n);
+    mat3 _e2 = m_n(n);
     vec3 t = (_e2[0] * axis.x) + (_e2[1] * axis.y);
     vec2 d = (t.xy * n.z) - (t.z * n.xy);
     float length_squared = dot(d, d);
@@ -637,17 +637,17 @@ struct SlopeDistribution {
 /// and squared roughness matrix `a` (xx, xy, yy) in the frame of `m_n`.
 ///
 /// Cost on GCN: 51 instructions (1 at a quarter of the rate).
-mat3x3 sggx_from_ggx(vec3 n, vec3 a) {
-    mat3x3 _e2 = m_n(n);
+mat3 sggx_from_ggx(vec3 n, vec3 a) {
+    mat3 _e2 = m_n(n);
     vec3 ax = (_e2[0] * a.x) + (_e2[1] * a.y);
     vec3 ay = (_e2[0] * a.y) + (_e2[1] * a.z);
-    return mat3x3((((ax * _e2[0].x) + (ay * _e2[1].x)) + (n * n.x)), (((ax * _e2[0].y) + (ay * _e2[1].y)) + (n * n.y)), (((ax * _e2[0].z) + (ay * _e2[1].z)) + (n * n.z)));
+    return mat3((((ax * _e2[0].x) + (ay * _e2[1].x)) + (n * n.x)), (((ax * _e2[0].y) + (ay * _e2[1].y)) + (n * n.y)), (((ax * _e2[0].z) + (ay * _e2[1].z)) + (n * n.z)));
 }
 
 /// Area of the microflakes projected along the unit vector `w`: `sqrt(w^T S w)` (Heitz 2015).
 ///
 /// Cost on GCN: 14 instructions (1 at a quarter of the rate).
-float sggx_projected_area(mat3x3 s, vec3 w) {
+float sggx_projected_area(mat3 s, vec3 w) {
     float _e2 = sym3_quadratic(s, w);
     return sqrt(max(_e2, 0.0));
 }
@@ -657,9 +657,9 @@ float sggx_projected_area(mat3x3 s, vec3 w) {
 /// positive determinant. Single precision leaves a relative error of 1e-5 over the smallest eigenvalue.
 ///
 /// Cost on GCN: 39 instructions (2 at a quarter of the rate).
-float sggx_d(mat3x3 s, vec3 h) {
+float sggx_d(mat3 s, vec3 h) {
     float _e2 = sym3_det(s);
-    mat3x3 _e3 = sym3_adjugate(s);
+    mat3 _e3 = sym3_adjugate(s);
     float _e4 = sym3_quadratic(_e3, h);
     return (_e2 * sqrt(_e2)) / ((3.1415927 * _e4) * _e4);
 }
@@ -668,7 +668,7 @@ float sggx_d(mat3x3 s, vec3 h) {
 /// m^T, 1]`. The slopes follow a bivariate Student-t with two degrees of freedom.
 ///
 /// Cost on GCN: 9 instructions (1 at a quarter of the rate).
-SlopeDistribution slopes_from_sggx(mat3x3 s) {
+SlopeDistribution slopes_from_sggx(mat3 s) {
     float inv = 1.0 / s[2].z;
     vec2 m = s[2].xy * inv;
     vec3 a = (vec3(s[0].x, s[0].y, s[1].y) * inv) - vec3((m.x * m.x), (m.x * m.y), (m.y * m.y));
@@ -678,9 +678,9 @@ SlopeDistribution slopes_from_sggx(mat3x3 s) {
 /// The SGGX matrix with zz = 1 of a slope distribution; the inverse of `slopes_from_sggx`.
 ///
 /// Cost on GCN: 3 instructions.
-mat3x3 sggx_from_slopes(vec2 m, vec3 a) {
+mat3 sggx_from_slopes(vec2 m, vec3 a) {
     float xy = a.y + (m.x * m.y);
-    return mat3x3(vec3((a.x + (m.x * m.x)), xy, m.x), vec3(xy, (a.z + (m.y * m.y)), m.y), vec3(m, 1.0));
+    return mat3(vec3((a.x + (m.x * m.x)), xy, m.x), vec3(xy, (a.z + (m.y * m.y)), m.y), vec3(m, 1.0));
 }
 
 /// The talk's power iteration (slide: Our Algorithm, step 3): `steps` times `n = S n / |S n|` from `start`. The
@@ -688,7 +688,7 @@ mat3x3 sggx_from_slopes(vec2 m, vec3 a) {
 /// leaves the surface for its walls. `sggx_principal_axis` has neither fault.
 ///
 /// Cost on GCN: 34 instructions (2 at a quarter of the rate), one round of its loop.
-vec3 sggx_power_iteration(mat3x3 s, vec3 start, uint steps) {
+vec3 sggx_power_iteration(mat3 s, vec3 start, uint steps) {
     vec3 n = vec3(0.0);
     uint i = 0u;
     float _e3 = sym3_trace(s);
@@ -731,18 +731,18 @@ float sggx_overlap(float l, float moment, float moment_sqr) {
 /// projection of `start` on their space; `start` itself if `s` is a multiple of the identity. No trigonometry.
 ///
 /// Cost on GCN: 204 instructions (10 at a quarter of the rate).
-vec3 sggx_principal_axis(mat3x3 s, vec3 start) {
+vec3 sggx_principal_axis(mat3 s, vec3 start) {
     bool local_2 = false;
     bool local_3 = false;
-    mat3x3 identity = mat3x3(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0));
+    mat3 identity = mat3(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0));
     float _e17 = sym3_trace(s);
-    mat3x3 deviator = (s * (1.0 / _e17)) - (identity * 0.33333334);
+    mat3 deviator = (s * (1.0 / _e17)) - (identity * 0.33333334);
     float squares = (dot(deviator[0], deviator[0]) + dot(deviator[1], deviator[1])) + dot(deviator[2], deviator[2]);
     float size = sqrt((squares * 0.16666667));
-    mat3x3 unit = deviator * (1.0 / size);
+    mat3 unit = deviator * (1.0 / size);
     float _e41 = sym3_det(unit);
     float r = 0.5 * _e41;
-    mat3x3 b = unit * ((r < 0.0) ? -1.0 : 1.0);
+    mat3 b = unit * ((r < 0.0) ? -1.0 : 1.0);
     float t_sqr = max((0.5 - (0.5 * abs(r))), 0.0);
     float series = 1.0 + (t_sqr * (0.09259259 + (t_sqr * (0.039609052 + (t_sqr * 0.023157675)))));
     float sine = (sqrt(t_sqr) * 0.6666667) * series;
@@ -778,7 +778,7 @@ vec3 sggx_principal_axis(mat3x3 s, vec3 start) {
     bool _e117 = local_3;
     vec3 projected = normalize((_e117 ? p : q));
     float _e120 = sym3_quadratic(b, projected);
-    mat3x3 _e123 = sym3_adjugate((b - (identity * _e120)));
+    mat3 _e123 = sym3_adjugate((b - (identity * _e120)));
     vec3 refined = _e123 * projected;
     float refined_length = length(refined);
     bool far = refined_length > ((6.0 * 1.7320508) * 0.001);
@@ -790,10 +790,10 @@ vec3 sggx_principal_axis(mat3x3 s, vec3 start) {
 /// `ggx_from_sggx` before the clamp of the roughness.
 ///
 /// Cost on GCN: 268 instructions (12 at a quarter of the rate).
-GgxSurface ggx_from_sggx_unclamped(mat3x3 s, vec3 mean_normal) {
+GgxSurface ggx_from_sggx_unclamped(mat3 s, vec3 mean_normal) {
     vec3 _e2 = sggx_principal_axis(s, mean_normal);
     vec3 n = (_e2.z < 0.0) ? -(_e2) : _e2;
-    mat3x3 _e8 = m_n(n);
+    mat3 _e8 = m_n(n);
     vec3 sx = s * _e8[0];
     vec3 sy = s * _e8[1];
     float _e13 = sym3_quadratic(s, n);
@@ -806,7 +806,7 @@ GgxSurface ggx_from_sggx_unclamped(mat3x3 s, vec3 mean_normal) {
 /// roughness lie in [0, 1]: a microsurface rougher than alpha = 1 is clamped, because no texture can hold it.
 ///
 /// Cost on GCN: 321 instructions (17 at a quarter of the rate).
-GgxSurface ggx_from_sggx(mat3x3 s, vec3 mean_normal) {
+GgxSurface ggx_from_sggx(mat3 s, vec3 mean_normal) {
     GgxSurface _e2 = ggx_from_sggx_unclamped(s, mean_normal);
     vec3 _e7 = sym2_clamp_eigen(_e2.a, 0.0, 1.0);
     return GgxSurface(_e2.normal, _e7);

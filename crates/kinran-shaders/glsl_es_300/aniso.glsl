@@ -64,14 +64,14 @@ vec3 aniso_decode_matrix(vec3 texel) {
 /// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
 /// 0.03° of the exact one.
 ///
-/// Cost on GCN: 36 instructions (5 at a quarter of the rate).
+/// Cost on GCN: 37 instructions (5 at a quarter of the rate).
 AnisoDecoded aniso_decode(vec3 texel, vec3 tangent, vec3 bitangent) {
     float rho = (texel.y * 2.0) - 1.0;
     float product = texel.x * texel.z;
     float sxy = product * rho;
-    float sxx = (texel.x * texel.x) + 1e-12;
+    float sxx = texel.x * texel.x;
     float syy = texel.z * texel.z;
-    float half_difference = 0.5 * (sxx - syy);
+    float half_difference = (0.5 * (sxx - syy)) + 1e-12;
     float discr_sqr = 4.0 * ((half_difference * half_difference) + (sxy * sxy));
     float discr_rcp = inversesqrt(discr_sqr);
     float alpha_t_sqr = 0.5 * ((sxx + syy) + (discr_sqr * discr_rcp));
@@ -99,7 +99,7 @@ vec3 aniso_from_alphas(float alpha_t, float alpha_b, vec2 axis) {
 ///
 /// Cost on GCN: 23 instructions (2 at a quarter of the rate).
 vec2 axis_from_direction(vec2 direction, vec3 n) {
-    mat3x3 _e2 = m_n(n);
+    mat3 _e2 = m_n(n);
     vec2 axis = vec2(dot(_e2[0].xy, direction), dot(_e2[1].xy, direction));
     float length_squared = dot(axis, axis);
     return (length_squared > 1e-12) ? (axis * inversesqrt(length_squared)) : direction;
@@ -110,7 +110,7 @@ vec2 axis_from_direction(vec2 direction, vec3 n) {
 ///
 /// Cost on GCN: 31 instructions (2 at a quarter of the rate).
 vec2 direction_from_axis(vec2 axis, vec3 n) {
-    mat3x3 _e2 = m_n(n);
+    mat3 _e2 = m_n(n);
     vec3 t = (_e2[0] * axis.x) + (_e2[1] * axis.y);
     vec2 d = (t.xy * n.z) - (t.z * n.xy);
     float length_squared = dot(d, d);

@@ -14,14 +14,14 @@
 /// is below 1e-6 the half turn about x is returned, whose third column is −z.
 ///
 /// Cost on GCN: 13 instructions (1 at a quarter of the rate).
-mat3x3 m_n(vec3 n) {
+mat3 m_n(vec3 n) {
     float d = 1.0 + n.z;
     if (d < 1e-6) {
-        return mat3x3(vec3(1.0, 0.0, 0.0), vec3(0.0, -1.0, 0.0), vec3(0.0, 0.0, -1.0));
+        return mat3(vec3(1.0, 0.0, 0.0), vec3(0.0, -1.0, 0.0), vec3(0.0, 0.0, -1.0));
     }
     float a = 1.0 / d;
     float xy = (-(n.x) * n.y) * a;
-    return mat3x3(vec3((n.z + ((n.y * n.y) * a)), xy, -(n.x)), vec3(xy, (n.z + ((n.x * n.x) * a)), -(n.y)), n);
+    return mat3(vec3((n.z + ((n.y * n.y) * a)), xy, -(n.x)), vec3(xy, (n.z + ((n.x * n.x) * a)), -(n.y)), n);
 }
 
 /// A unit normal from the xy of a normal map, each in [−1, 1]. Where x² + y² exceeds one, as compression and

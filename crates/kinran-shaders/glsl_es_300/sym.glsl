@@ -113,28 +113,28 @@ vec3 sym2_sqrt(vec3 a) {
 /// `v^T A v`.
 ///
 /// Cost on GCN: 12 instructions.
-float sym3_quadratic(mat3x3 a, vec3 v) {
+float sym3_quadratic(mat3 a, vec3 v) {
     return dot(v, (a * v));
 }
 
 /// Trace of a 3×3 matrix.
 ///
 /// Cost on GCN: 2 instructions.
-float sym3_trace(mat3x3 a) {
+float sym3_trace(mat3 a) {
     return (a[0].x + a[1].y) + a[2].z;
 }
 
 /// The adjugate of a symmetric matrix: `A adj(A) = det(A) I`. Its columns are the cross products of A's.
 ///
 /// Cost on GCN: 18 instructions.
-mat3x3 sym3_adjugate(mat3x3 a) {
-    return mat3x3(cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]));
+mat3 sym3_adjugate(mat3 a) {
+    return mat3(cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]));
 }
 
 /// Determinant of a symmetric 3×3 matrix.
 ///
 /// Cost on GCN: 9 instructions.
-float sym3_det(mat3x3 a) {
+float sym3_det(mat3 a) {
     return dot(a[0], cross(a[1], a[2]));
 }
 

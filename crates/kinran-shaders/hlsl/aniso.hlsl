@@ -83,15 +83,15 @@ AnisoDecoded ConstructAnisoDecoded(float arg0, float arg1, float3 arg2, float3 a
 /// tangent vanishes on every texel aligned with the bitangent. The axis comes from cos² and sin² of its angle, within
 /// 0.03° of the exact one.
 ///
-/// Cost on GCN: 36 instructions (5 at a quarter of the rate).
+/// Cost on GCN: 37 instructions (5 at a quarter of the rate).
 AnisoDecoded aniso_decode(float3 texel, float3 tangent, float3 bitangent)
 {
     float rho = (texel.y * 2.0) - 1.0;
     float product = texel.x * texel.z;
     float sxy = product * rho;
-    float sxx = (texel.x * texel.x) + 1e-12;
+    float sxx = texel.x * texel.x;
     float syy = texel.z * texel.z;
-    float half_difference = 0.5 * (sxx - syy);
+    float half_difference = (0.5 * (sxx - syy)) + 1e-12;
     float discr_sqr = 4.0 * ((half_difference * half_difference) + (sxy * sxy));
     float discr_rcp = rsqrt(discr_sqr);
     float alpha_t_sqr = 0.5 * ((sxx + syy) + (discr_sqr * discr_rcp));

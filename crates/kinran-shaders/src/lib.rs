@@ -14,6 +14,9 @@ pub use texts::*;
 /// All modules as a SPIR-V module that `spirv-link` links, each function exported under its name.
 pub const SPIRV: &[u8] = include_bytes!("../spirv/kinran.spv");
 
+/// How to link it.
+pub const SPIRV_README: &str = include_str!("../spirv/README.md");
+
 /// A module of the library in one language.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Module {

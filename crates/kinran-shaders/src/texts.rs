@@ -4,6 +4,9 @@
 pub mod wesl {
     use crate::Module;
 
+    /// How to include it.
+    pub const README: &str = include_str!("../src/README.md");
+
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../src/beckmann.wesl");
 
@@ -44,6 +47,9 @@ pub mod wesl {
 /// WGSL.
 pub mod wgsl {
     use crate::Module;
+
+    /// How to include it.
+    pub const README: &str = include_str!("../wgsl/README.md");
 
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../wgsl/beckmann.wgsl");
@@ -89,6 +95,9 @@ pub mod wgsl {
 pub mod glsl_450 {
     use crate::Module;
 
+    /// How to include it.
+    pub const README: &str = include_str!("../glsl_450/README.md");
+
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../glsl_450/beckmann.glsl");
 
@@ -132,6 +141,9 @@ pub mod glsl_450 {
 /// GLSL ES 3.00.
 pub mod glsl_es_300 {
     use crate::Module;
+
+    /// How to include it.
+    pub const README: &str = include_str!("../glsl_es_300/README.md");
 
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../glsl_es_300/beckmann.glsl");
@@ -177,6 +189,9 @@ pub mod glsl_es_300 {
 pub mod hlsl {
     use crate::Module;
 
+    /// How to include it.
+    pub const README: &str = include_str!("../hlsl/README.md");
+
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../hlsl/beckmann.hlsl");
 
@@ -220,6 +235,9 @@ pub mod hlsl {
 /// MSL.
 pub mod msl {
     use crate::Module;
+
+    /// How to include it.
+    pub const README: &str = include_str!("../msl/README.md");
 
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../msl/beckmann.h");

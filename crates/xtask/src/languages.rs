@@ -86,7 +86,8 @@ fn to_glsl(wgsl: &str, version: glsl::Version) -> Result<String, Error> {
         .write()?;
     let stub = text.find("\nvoid main() {").ok_or("naga wrote no stub")?;
     text.truncate(stub);
-    Ok(text)
+    // The same type under the name that Godot's dialect knows too.
+    Ok(text.replace("mat3x3", "mat3"))
 }
 
 fn to_hlsl(wgsl: &str) -> Result<String, Error> {

@@ -250,6 +250,9 @@ fn texts_rs(modules: &[Module]) -> String {
     let others = LANGUAGES.iter().map(|l| (l.folder, l.name, l.folder, l.extension));
     for (language, name, folder, extension) in wgsl.into_iter().chain(others) {
         text += &format!("\n/// {name}.\npub mod {language} {{\n    use crate::Module;\n");
+        text += &format!(
+            "\n    /// How to include it.\n    pub const README: &str = include_str!(\"../{folder}/README.md\");\n"
+        );
         for module in modules {
             let (lower, upper) = (&module.name, module.name.to_uppercase());
             text += &format!(

@@ -77,7 +77,7 @@ pub fn green_correlation(image: &Image) -> f64 {
         row.iter().map(slopes).collect()
     };
     let sums = in_rows(image, 1..image.height - 1, |y| {
-        let rows = [y - 1, y, y + 1].map(|y| row_slopes(y));
+        let rows = [y - 1, y, y + 1].map(&row_slopes);
         let (mut ab, mut aabb) = (0.0, 0.0);
         for x in 1..width - 1 {
             let a = rows[2][x].0 - rows[0][x].0;

@@ -5,26 +5,26 @@ use glam::{Mat3, Vec2, Vec3, vec2, vec3};
 use kinran_shading::{self as rust, Sym2, Sym3, sh};
 
 /// A shader function and its twin.
-pub struct Case {
+pub(crate) struct Case {
     /// The shader function's name.
-    pub function: &'static str,
+    pub(crate) function: &'static str,
     /// What feeds its arguments, in order.
-    pub arguments: Vec<Argument>,
+    pub(crate) arguments: Vec<Argument>,
     /// The Rust function, on flattened numbers.
-    pub twin: fn(&[f32]) -> Vec<f32>,
+    pub(crate) twin: fn(&[f32]) -> Vec<f32>,
     /// Turns inputs and outputs into numbers that both must share, where the outputs themselves need not agree.
-    pub canonical: fn(&[f32], &[f32]) -> Vec<f32>,
+    pub(crate) canonical: fn(&[f32], &[f32]) -> Vec<f32>,
     /// Largest difference, in the output's unit.
-    pub absolute: f32,
+    pub(crate) absolute: f32,
     /// Largest difference per output.
-    pub relative: f32,
+    pub(crate) relative: f32,
     /// Why so much.
-    pub reason: &'static str,
+    pub(crate) reason: &'static str,
 }
 
 /// Values of one argument.
 #[derive(Clone)]
-pub struct Argument {
+pub(crate) struct Argument {
     edges: Vec<Vec<f32>>,
     random: fn(&mut Rng) -> Vec<f32>,
 }
@@ -32,7 +32,7 @@ pub struct Argument {
 impl Case {
     /// `count` inputs: all combinations of edges (as many as fit into half of them), then random ones. The same for
     /// every run.
-    pub fn inputs(&self, count: usize) -> Vec<Vec<f32>> {
+    pub(crate) fn inputs(&self, count: usize) -> Vec<Vec<f32>> {
         let mut rng = Rng::with_seed(2020);
         let combinations: usize = self.arguments.iter().map(|a| a.edges.len()).product();
         (0..count)
@@ -97,7 +97,14 @@ fn hemisphere() -> Argument {
 /// A unit vector.
 fn direction() -> Argument {
     argument(
-        &[[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.6, 0.0, 0.8], [0.0, 0.6, -0.8]],
+        &[
+            [0.0, 0.0, 1.0],
+            [0.0, 0.0, -1.0],
+            [1.0, 0.0, 0.0],
+            [0.0, -1.0, 0.0],
+            [0.6, 0.0, 0.8],
+            [0.0, 0.6, -0.8],
+        ],
         |rng| random_direction(rng).to_array().to_vec(),
     )
 }
@@ -120,7 +127,17 @@ fn plane() -> Argument {
 /// A colour or texel.
 fn triple() -> Argument {
     argument(
-        &[[0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.04, 0.04, 0.04], [1.0, 0.5, 0.0], [0.5, 128.0 / 255.0, 0.5], [0.02, 1.0, 0.3]],
+        &[
+            [0.0, 0.0, 0.0],
+            [1.0, 1.0, 1.0],
+            [0.04, 0.04, 0.04],
+            [1.0, 0.5, 0.0],
+            [0.5, 128.0 / 255.0, 0.5],
+            [0.3, 0.5, 0.3],
+            [1.0, 0.5, 1.0],
+            [0.0, 0.5, 0.0],
+            [0.02, 1.0, 0.3],
+        ],
         |rng| vec![rng.f32(), rng.f32(), rng.f32()],
     )
 }
@@ -133,7 +150,14 @@ fn random_roughness(rng: &mut Rng) -> Sym2 {
 /// A squared roughness matrix (xx, xy, yy) whose determinant has digits left.
 fn roughness() -> Argument {
     argument(
-        &[[1.0, 0.0, 1.0], [0.25, 0.0, 0.01], [0.01, 0.0, 0.25], [0.2, 0.1, 0.1], [0.2, -0.1, 0.1], [1.6e-5, 0.0, 1.6e-5]],
+        &[
+            [1.0, 0.0, 1.0],
+            [0.25, 0.0, 0.01],
+            [0.01, 0.0, 0.25],
+            [0.2, 0.1, 0.1],
+            [0.2, -0.1, 0.1],
+            [1.6e-5, 0.0, 1.6e-5],
+        ],
         |rng| {
             let a = random_roughness(rng);
             vec![a.xx, a.xy, a.yy]
@@ -144,7 +168,9 @@ fn roughness() -> Argument {
 /// Any symmetric positive semi-definite 2×2 matrix, zero and singular ones included.
 fn semi_definite() -> Argument {
     let mut argument = roughness();
-    argument.edges.extend([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 4.0], [1.0, 1.0, 1.0]].map(|e| e.to_vec()));
+    argument
+        .edges
+        .extend([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 4.0], [1.0, 1.0, 1.0]].map(|e| e.to_vec()));
     argument
 }
 
@@ -267,7 +293,7 @@ fn rebuilt_surface(i: &[f32], o: &[f32]) -> Vec<f32> {
 const ROUNDING: &str = "a few roundings; Vulkan allows 2.5 ulp to a division and 2 to an inverse root";
 
 /// Every function, in the order of the modules.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let case = |function, arguments: Vec<Argument>, twin| Case {
         function,
         arguments,
@@ -279,7 +305,9 @@ pub fn cases() -> Vec<Case> {
     };
     let mut cases = vec![
         // sym
-        case("sym2_from_eigen", vec![unit(), unit(), axis()], |x| of_sym2(Sym2::from_eigen(x[0], x[1], v2(&x[2..])))),
+        case("sym2_from_eigen", vec![unit(), unit(), axis()], |x| {
+            of_sym2(Sym2::from_eigen(x[0], x[1], v2(&x[2..])))
+        }),
         case("sym2_outer", vec![plane()], |x| of_sym2(Sym2::outer(v2(x)))),
         case("sym2_det", vec![semi_definite()], |x| vec![s2(x).det()]),
         case("sym2_trace", vec![semi_definite()], |x| vec![s2(x).trace()]),
@@ -291,9 +319,15 @@ pub fn cases() -> Vec<Case> {
                 vec![l1, l2, axis.x, axis.y]
             })
         },
-        case("sym2_clamp_eigen", vec![semi_definite(), argument(&[[0.0]], |r| vec![r.f32() * 0.1]), argument(&[[1.0]], |r| vec![0.5 + r.f32()])], |x| {
-            of_sym2(s2(x).clamp_eigen(x[3], x[4]))
-        }),
+        case(
+            "sym2_clamp_eigen",
+            vec![
+                semi_definite(),
+                argument(&[[0.0]], |r| vec![r.f32() * 0.1]),
+                argument(&[[1.0]], |r| vec![0.5 + r.f32()]),
+            ],
+            |x| of_sym2(s2(x).clamp_eigen(x[3], x[4])),
+        ),
         case("sym2_sqrt", vec![semi_definite()], |x| of_sym2(s2(x).sqrt())),
         case("sym3_quadratic", vec![sggx(), direction()], |x| vec![s3(x).quadratic(v3(&x[9..]))]),
         case("sym3_trace", vec![sggx()], |x| vec![s3(x).trace()]),
@@ -308,15 +342,26 @@ pub fn cases() -> Vec<Case> {
         Case {
             absolute: 4e-4,
             reason: "z is the root of a difference: one ulp of 1 - x² - y² is 3.5e-4 at the horizon",
-            ..case("normal_from_xy", vec![argument(&[[0.0], [1.0], [-1.0], [0.6]], |r| vec![r.f32() * 2.0 - 1.0]), argument(&[[0.0], [1.0], [-0.8]], |r| vec![r.f32() * 2.0 - 1.0])], |x| of3(rust::normal_from_xy(x[0], x[1])))
+            ..case(
+                "normal_from_xy",
+                vec![
+                    argument(&[[0.0], [1.0], [-1.0], [0.6]], |r| vec![r.f32() * 2.0 - 1.0]),
+                    argument(&[[0.0], [1.0], [-0.8]], |r| vec![r.f32() * 2.0 - 1.0]),
+                ],
+                |x| of3(rust::normal_from_xy(x[0], x[1])),
+            )
         },
         // ggx
         case("ggx_d", vec![cosine(), alpha()], |x| vec![rust::ggx_d(x[0], x[1])]),
-        case("ggx_aniso_d", vec![hemisphere(), alpha(), alpha()], |x| vec![rust::ggx_aniso_d(v3(x), x[3], x[4])]),
+        case("ggx_aniso_d", vec![hemisphere(), alpha(), alpha()], |x| {
+            vec![rust::ggx_aniso_d(v3(x), x[3], x[4])]
+        }),
         Case {
             relative: 4e-4,
             reason: "the quadratic form cancels where h lies along the smaller roughness: 25² ulp at alphas (0.5, 0.02)",
-            ..case("ggx_matrix_d", vec![hemisphere(), roughness()], |x| vec![rust::ggx_matrix_d(v3(x), s2(&x[3..]))])
+            ..case("ggx_matrix_d", vec![hemisphere(), roughness()], |x| {
+                vec![rust::ggx_matrix_d(v3(x), s2(&x[3..]))]
+            })
         },
         case("smith_v_of_terms", vec![unit(), unit()], |x| vec![0.5 / (x[0] + x[1]).max(f32::MIN_POSITIVE)]),
         case("smith_v", vec![cosine(), cosine(), alpha()], |x| vec![rust::smith_v(x[0], x[1], x[2])]),
@@ -326,21 +371,34 @@ pub fn cases() -> Vec<Case> {
         case("smith_matrix_v", vec![hemisphere(), hemisphere(), roughness()], |x| {
             vec![rust::smith_matrix_v(v3(x), v3(&x[3..]), s2(&x[6..]))]
         }),
-        case("smith_aniso_g1", vec![hemisphere(), alpha(), alpha()], |x| vec![rust::smith_aniso_g1(v3(x), x[3], x[4])]),
+        case("smith_aniso_g1", vec![hemisphere(), alpha(), alpha()], |x| {
+            vec![rust::smith_aniso_g1(v3(x), x[3], x[4])]
+        }),
         case("schlick_f", vec![triple(), unit()], |x| of3(rust::schlick_f(v3(x), x[3]))),
         Case {
             absolute: 2e-3,
             reason: "Vulkan allows sine and cosine an error of 2^-11",
-            ..case("ggx_vndf_sample", vec![hemisphere(), alpha(), alpha(), argument(&[[0.0, 0.0], [0.5, 0.5], [0.25, 0.9]], |r| vec![r.f32(), r.f32()])], |x| {
-                of3(rust::ggx_vndf_sample(v3(x), x[3], x[4], v2(&x[5..])))
-            })
+            ..case(
+                "ggx_vndf_sample",
+                vec![
+                    hemisphere(),
+                    alpha(),
+                    alpha(),
+                    argument(&[[0.0, 0.0], [0.5, 0.5], [0.25, 0.9]], |r| vec![r.f32(), r.f32()]),
+                ],
+                |x| of3(rust::ggx_vndf_sample(v3(x), x[3], x[4], v2(&x[5..]))),
+            )
         },
         case("ggx_vndf_pdf", vec![hemisphere(), direction(), alpha(), alpha()], |x| {
             vec![rust::ggx_vndf_pdf(v3(x), v3(&x[3..]), x[6], x[7])]
         }),
         // sggx
-        case("sggx_from_ggx", vec![hemisphere(), roughness()], |x| columns(rust::sggx_from_ggx(v3(x), s2(&x[3..])))),
-        case("sggx_projected_area", vec![sggx(), direction()], |x| vec![rust::sggx_projected_area(s3(x), v3(&x[9..]))]),
+        case("sggx_from_ggx", vec![hemisphere(), roughness()], |x| {
+            columns(rust::sggx_from_ggx(v3(x), s2(&x[3..])))
+        }),
+        case("sggx_projected_area", vec![sggx(), direction()], |x| {
+            vec![rust::sggx_projected_area(s3(x), v3(&x[9..]))]
+        }),
         Case {
             relative: 0.05,
             reason: "the determinant cancels: 1e-5 over the smallest eigenvalue, which is 0.0004 here",
@@ -353,7 +411,9 @@ pub fn cases() -> Vec<Case> {
                 vec![m.x, m.y, a.xx, a.xy, a.yy]
             })
         },
-        case("sggx_from_slopes", vec![plane(), semi_definite()], |x| columns(rust::sggx_from_slopes(v2(x), s2(&x[2..])))),
+        case("sggx_from_slopes", vec![plane(), semi_definite()], |x| {
+            columns(rust::sggx_from_slopes(v2(x), s2(&x[2..])))
+        }),
         Case {
             absolute: 2e-5,
             reason: "roundings add up over fifteen steps",
@@ -361,14 +421,18 @@ pub fn cases() -> Vec<Case> {
                 of3(rust::sggx_power_iteration(s3(x), v3(&x[9..]), x[12] as u32))
             })
         },
-        case("sggx_overlap", vec![argument(&[[2.0], [-2.0]], |r| vec![1.2 + r.f32()]), unit(), unit()], |x| {
-            vec![(x[2] + x[0] * x[1] + x[0] * x[0] - 3.0) / (3.0 * x[0] * x[0] - 3.0)]
-        }),
+        case(
+            "sggx_overlap",
+            vec![argument(&[[2.0], [-2.0]], |r| vec![1.2 + r.f32()]), unit(), unit()],
+            |x| vec![(x[2] + x[0] * x[1] + x[0] * x[0] - 3.0) / (3.0 * x[0] * x[0] - 3.0)],
+        ),
         Case {
             canonical: axis_quality,
             absolute: 1e-3,
             reason: "the residual is 5e-4 of the trace at worst, on the verge of a coincidence of eigenvalues",
-            ..case("sggx_principal_axis", vec![sggx(), hemisphere()], |x| of3(rust::sggx_principal_axis(s3(x), v3(&x[9..]))))
+            ..case("sggx_principal_axis", vec![sggx(), hemisphere()], |x| {
+                of3(rust::sggx_principal_axis(s3(x), v3(&x[9..])))
+            })
         },
         Case {
             canonical: rebuilt_surface,
@@ -397,17 +461,31 @@ pub fn cases() -> Vec<Case> {
             canonical: rebuilt_aniso,
             absolute: 5e-4,
             reason: "the axis comes from cos² of its angle, whose rounding is 2.5e-4 rad at worst",
-            ..case("aniso_decode", vec![triple(), argument(&[[1.0, 0.0, 0.0]], |_| vec![0.6, 0.0, 0.8]), argument(&[[0.0, 1.0, 0.0]], |_| vec![0.0, 1.0, 0.0])], |x| {
-                let d = rust::aniso_decode(v3(x), v3(&x[3..]), v3(&x[6..]));
-                let mut numbers = vec![d.alpha_t, d.alpha_b];
-                numbers.extend(of3(d.tangent));
-                numbers.extend(of3(d.bitangent));
-                numbers
-            })
+            ..case(
+                "aniso_decode",
+                vec![
+                    triple(),
+                    argument(&[[1.0, 0.0, 0.0]], |_| vec![0.6, 0.0, 0.8]),
+                    argument(&[[0.0, 1.0, 0.0]], |_| vec![0.0, 1.0, 0.0]),
+                ],
+                |x| {
+                    let d = rust::aniso_decode(v3(x), v3(&x[3..]), v3(&x[6..]));
+                    let mut numbers = vec![d.alpha_t, d.alpha_b];
+                    numbers.extend(of3(d.tangent));
+                    numbers.extend(of3(d.bitangent));
+                    numbers
+                },
+            )
         },
-        case("aniso_from_alphas", vec![alpha(), alpha(), axis()], |x| of_sym2(rust::aniso_from_alphas(x[0], x[1], v2(&x[2..])))),
-        case("axis_from_direction", vec![axis(), hemisphere()], |x| of2(rust::axis_from_direction(v2(x), v3(&x[2..])))),
-        case("direction_from_axis", vec![axis(), hemisphere()], |x| of2(rust::direction_from_axis(v2(x), v3(&x[2..])))),
+        case("aniso_from_alphas", vec![alpha(), alpha(), axis()], |x| {
+            of_sym2(rust::aniso_from_alphas(x[0], x[1], v2(&x[2..])))
+        }),
+        case("axis_from_direction", vec![axis(), hemisphere()], |x| {
+            of2(rust::axis_from_direction(v2(x), v3(&x[2..])))
+        }),
+        case("direction_from_axis", vec![axis(), hemisphere()], |x| {
+            of2(rust::direction_from_axis(v2(x), v3(&x[2..])))
+        }),
         case("alphas_from_khr_anisotropy", vec![unit(), unit()], |x| {
             let (t, b) = rust::alphas_from_khr_anisotropy(x[0], x[1]);
             vec![t, b]
@@ -426,7 +504,9 @@ pub fn cases() -> Vec<Case> {
         Case {
             relative: 2e-3,
             reason: "Vulkan allows exp(x) an error of 3 + 2|x| ulp, and the argument's own rounding grows with it",
-            ..case("beckmann_aniso_d", vec![hemisphere(), alpha(), alpha()], |x| vec![rust::beckmann_aniso_d(v3(x), x[3], x[4])])
+            ..case("beckmann_aniso_d", vec![hemisphere(), alpha(), alpha()], |x| {
+                vec![rust::beckmann_aniso_d(v3(x), x[3], x[4])]
+            })
         },
         case("slope_from_normal", vec![hemisphere()], |x| of2(rust::slope_from_normal(v3(x)))),
         case("normal_from_slope", vec![plane()], |x| of3(rust::normal_from_slope(v2(x)))),
@@ -434,7 +514,9 @@ pub fn cases() -> Vec<Case> {
         Case {
             relative: 4e-5,
             reason: "both polynomials cancel near alpha = 0",
-            ..case("ggx_directional_albedo", vec![unit(), alpha()], |x| vec![rust::ggx_directional_albedo(x[0], x[1])])
+            ..case("ggx_directional_albedo", vec![unit(), alpha()], |x| {
+                vec![rust::ggx_directional_albedo(x[0], x[1])]
+            })
         },
         Case {
             relative: 1e-4,
@@ -448,8 +530,12 @@ pub fn cases() -> Vec<Case> {
     cases.extend([
         case("sh_basis", vec![direction()], |x| sh::sh_basis(v3(x)).to_vec()),
         case("sh_evaluate", vec![harmonics(), direction()], |x| of3(sh::sh_evaluate(&sh9(x), v3(&x[27..])))),
-        case("sh_convolve_cosine", vec![harmonics()], |x| sh::sh_convolve_cosine(&sh9(x)).iter().flat_map(|v| v.to_array()).collect()),
-        case("sh_irradiance", vec![harmonics(), direction()], |x| of3(sh::sh_irradiance(&sh9(x), v3(&x[27..])))),
+        case("sh_convolve_cosine", vec![harmonics()], |x| {
+            sh::sh_convolve_cosine(&sh9(x)).iter().flat_map(|v| v.to_array()).collect()
+        }),
+        case("sh_irradiance", vec![harmonics(), direction()], |x| {
+            of3(sh::sh_irradiance(&sh9(x), v3(&x[27..])))
+        }),
     ]);
     cases
 }

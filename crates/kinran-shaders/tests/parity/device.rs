@@ -5,25 +5,26 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use crate::signature::Signature;
 
 /// A device and its queue.
-pub struct Device {
+pub(crate) struct Device {
     device: wgpu::Device,
     queue: wgpu::Queue,
 }
 
 impl Device {
     /// The first Vulkan device there is.
-    pub fn open() -> Option<Self> {
+    pub(crate) fn open() -> Option<Self> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = wgpu::Backends::VULKAN;
         let instance = wgpu::Instance::new(descriptor);
-        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).ok()?;
+        let adapter =
+            pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).ok()?;
         let (device, queue) =
             pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default())).unwrap();
         Some(Self { device, queue })
     }
 
     /// What the function returns for each input.
-    pub fn call(&self, library: &str, signature: &Signature, inputs: &[Vec<f32>]) -> Vec<Vec<f32>> {
+    pub(crate) fn call(&self, library: &str, signature: &Signature, inputs: &[Vec<f32>]) -> Vec<Vec<f32>> {
         let text = library.to_owned() + &signature.entry_point(inputs.len());
         let shader = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(&signature.name),

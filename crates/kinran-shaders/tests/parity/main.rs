@@ -100,7 +100,11 @@ fn no_shader_function_is_without_a_parity_test() {
     let tested: BTreeSet<String> = cases().iter().map(|case| case.function.to_owned()).collect();
     let there: BTreeSet<String> = Signature::all(kinran_shaders::wgsl::ALL).into_keys().collect();
     assert_eq!(there.difference(&tested).collect::<Vec<_>>(), Vec::<&String>::new(), "have no parity test");
-    assert_eq!(tested.difference(&there).collect::<Vec<_>>(), Vec::<&String>::new(), "are no shader functions");
+    assert_eq!(
+        tested.difference(&there).collect::<Vec<_>>(),
+        Vec::<&String>::new(),
+        "are no shader functions"
+    );
 }
 
 /// The shader library is the formulas' second language: what is public in one is there in the other.

@@ -6,9 +6,9 @@ use std::fmt::Write;
 use naga::{ArraySize, Handle, Module, Scalar, ScalarKind, Type, TypeInner, VectorSize};
 
 /// A function of the library.
-pub struct Signature {
+pub(crate) struct Signature {
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     arguments: Vec<Shape>,
     result: Shape,
 }
@@ -103,8 +103,9 @@ impl Shape {
 
 impl Signature {
     /// All functions of a library, by name.
-    pub fn all(library: &str) -> BTreeMap<String, Self> {
-        let module = naga::front::wgsl::parse_str(library).unwrap_or_else(|e| panic!("{}", e.emit_to_string(library)));
+    pub(crate) fn all(library: &str) -> BTreeMap<String, Self> {
+        let module =
+            naga::front::wgsl::parse_str(library).unwrap_or_else(|e| panic!("{}", e.emit_to_string(library)));
         let one = |function: &naga::Function| Self {
             name: function.name.clone().unwrap(),
             arguments: function.arguments.iter().map(|a| Shape::new(&module, a.ty)).collect(),
@@ -114,17 +115,17 @@ impl Signature {
     }
 
     /// Numbers in.
-    pub fn inputs(&self) -> usize {
+    pub(crate) fn inputs(&self) -> usize {
         self.arguments.iter().map(Shape::len).sum()
     }
 
     /// Numbers out.
-    pub fn outputs(&self) -> usize {
+    pub(crate) fn outputs(&self) -> usize {
         self.result.len()
     }
 
     /// An entry point `main` that calls the function once per invocation, on numbers from one buffer to another.
-    pub fn entry_point(&self, count: usize) -> String {
+    pub(crate) fn entry_point(&self, count: usize) -> String {
         let mut at = 0;
         let arguments: Vec<String> = self.arguments.iter().map(|a| a.read(&mut at)).collect();
         let mut results = Vec::new();

@@ -4,3 +4,4 @@ mod bad_input;
 mod common;
 mod inspect;
 mod render;
+mod shaders;
