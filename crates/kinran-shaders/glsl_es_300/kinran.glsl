@@ -57,6 +57,128 @@ vec3 normal_from_slope(vec2 slope) {
 
 // Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
 // Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/detail_hsv.wesl, by ./x shaders. Needs: nothing else
+
+// Hue, saturation and value.
+
+#ifndef KINRAN_DETAIL_HSV_GLSL
+#define KINRAN_DETAIL_HSV_GLSL
+
+/// A linear colour in [0, 1]³ with its hue turned by `shift.x` turns, its HSV saturation multiplied by `shift.y` and its
+/// value by `shift.z`; `(0, 1, 1)` leaves it as it is. Both are clamped to 1 (Smith. Color gamut transform pairs. 1978).
+///
+/// Cost on GCN: 42 instructions (2 at a quarter of the rate).
+vec3 hsv_shift(vec3 color, vec3 shift) {
+    float value = max(color.x, max(color.y, color.z));
+    float chroma = value - min(color.x, min(color.y, color.z));
+    float scale = 1.0 / max(chroma, 1e-20);
+    vec3 differences = (color.yzx - color.zxy) * scale;
+    float green_or_blue = (color.y >= value) ? (2.0 + differences.y) : (4.0 + differences.z);
+    float sector = (color.x >= value) ? differences.x : green_or_blue;
+    float hue = (sector * 0.16666667) + shift.x;
+    float saturation = clamp(((chroma / max(value, 1e-20)) * shift.y), 0.0, 1.0);
+    vec3 k = 6.0 * fract((vec3(hue) + vec3(0.0, 0.6666667, 0.33333334)));
+    vec3 weight = clamp((abs((k - vec3(3.0))) - vec3(1.0)), vec3(0.0), vec3(1.0));
+    return clamp((value * shift.z), 0.0, 1.0) * (vec3(1.0) + ((weight - vec3(1.0)) * saturation));
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/detail_normal.wesl, by ./x shaders. Needs: nothing else
+
+// Normals laid over each other.
+
+#ifndef KINRAN_DETAIL_NORMAL_GLSL
+#define KINRAN_DETAIL_NORMAL_GLSL
+
+/// Reoriented normal mapping: the unit normal `detail` in the frame of the unit normal `base`, both with z ≥ 0; equals
+/// `m_n(base) * detail` (slide: Detail Maps; Barré-Brisebois and Hill. Blending in Detail. 2012). In detail mapping
+/// the synthesized normal is the base.
+///
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
+vec3 rnm(vec3 base, vec3 detail) {
+    vec3 t = base + vec3(0.0, 0.0, 1.0);
+    vec3 u = detail * vec3(-1.0, -1.0, 1.0);
+    return (t * (dot(t, u) / t.z)) - u;
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/detail_over.wesl, by ./x shaders. Needs: nothing else
+
+// Alpha blending, for aniso texels.
+
+#ifndef KINRAN_DETAIL_OVER_GLSL
+#define KINRAN_DETAIL_OVER_GLSL
+
+/// The texel `detail` over the texel `s` with opacity `alpha` in [0, 1] (slide: Detail Maps, "aniso maps blended with
+/// regular alpha blending"). Every mixture of aniso texels decodes to a positive semi-definite matrix.
+///
+/// Cost on GCN: 6 instructions.
+vec3 detail_over(vec3 s, vec3 detail, float alpha) {
+    return s + ((detail - s) * alpha);
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/detail_overlay.wesl, by ./x shaders. Needs: nothing else
+
+// Overlay and the talk's smooth overlay: a synthesized value `s` lays itself over a detail `d` so that every target can
+// be reached (slides: Detail Maps). Both are solved for `s` when textures are baked.
+//
+// Colour is linear light: sample the tile with sRGB decoding, the synthesized map without.
+
+#ifndef KINRAN_DETAIL_OVERLAY_GLSL
+#define KINRAN_DETAIL_OVERLAY_GLSL
+
+/// Overlay of a detail `d` by a synthesized value `s`, both in [0, 1] (slide: Detail Maps | Our Approach):
+/// `2sd` below s = 1/2, `1 - 2(1-s)(1-d)` from there on.
+///
+/// Cost on GCN: 7 instructions.
+float overlay(float s, float d) {
+    return (s < 0.5) ? ((2.0 * s) * d) : (1.0 - ((2.0 * (1.0 - s)) * (1.0 - d)));
+}
+
+/// `overlay` of each channel.
+///
+/// Cost on GCN: 21 instructions.
+vec3 overlay_color(vec3 s, vec3 d) {
+    return mix((vec3(1.0) - ((2.0 * (vec3(1.0) - s)) * (vec3(1.0) - d))), ((2.0 * s) * d), lessThan(s, vec3(0.5)));
+}
+
+/// The talk's smooth overlay, finer near `t = d` where a dark detail is brightened (slide: Detail Maps | Blending): as
+/// `overlay`, but `lerp(2sd, s, (2s-1)²)` where s ≥ 1/2 and d < 1/2.
+///
+/// Cost on GCN: 13 instructions.
+float smooth_overlay(float s, float d) {
+    float x = (2.0 * s) - 1.0;
+    float low = (2.0 * s) * d;
+    float bright = 1.0 - ((2.0 * (1.0 - s)) * (1.0 - d));
+    float dark = low + (((s - low) * x) * x);
+    return (s < 0.5) ? low : ((d < 0.5) ? dark : bright);
+}
+
+/// `smooth_overlay` of each channel.
+///
+/// Cost on GCN: 39 instructions.
+vec3 smooth_overlay_color(vec3 s, vec3 d) {
+    vec3 x = (2.0 * s) - vec3(1.0);
+    vec3 low = (2.0 * s) * d;
+    vec3 bright = vec3(1.0) - ((2.0 * (vec3(1.0) - s)) * (vec3(1.0) - d));
+    vec3 dark = low + (((s - low) * x) * x);
+    return mix(mix(bright, dark, lessThan(d, vec3(0.5))), low, lessThan(s, vec3(0.5)));
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
 // Made from src/frame.wesl, by ./x shaders. Needs: nothing else
 
 // The frame in which an anisotropic texel lives.
@@ -460,6 +582,70 @@ vec2 khr_anisotropy_from_alphas(float alpha_t, float alpha_b) {
     float rest = 1.0 - alpha_b;
     float strength = (rest > 0.0) ? sqrt(clamp(((alpha_t - alpha_b) / rest), 0.0, 1.0)) : 0.0;
     return vec2(sqrt(alpha_b), strength);
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/detail_layer.wesl, by ./x shaders. Needs: aniso
+
+// What a tiled layer's texels go through before they are blended: place, colour, direction, mask. Between `detail_uv`
+// and the rest stands the texture fetch, with the hardware's filter and its repeating or mirroring address mode.
+
+#ifndef KINRAN_DETAIL_LAYER_GLSL
+#define KINRAN_DETAIL_LAYER_GLSL
+
+/// The synthesized value of a texel in [0, 1]: byte 128 is 1/2, 1 and 0 are 0, 255 is 1. Without this mapping 8 bits do
+/// not hold the neutral 1/2, and a detail equal to its target would come out 0.4 % off.
+///
+/// Cost on GCN: 6 instructions.
+vec3 detail_from_texel(vec3 texel) {
+    return clamp(((texel * 1.003937) - vec3(0.003937008)), vec3(0.0), vec3(1.0));
+}
+
+/// Place in the tile: the mesh's `uv` scaled and rotated by `matrix`, then moved. The matrix is
+/// `KHR_texture_transform`'s, with columns `(cos sx, -sin sx)` and `(sin sy, cos sy)`.
+///
+/// Cost on GCN: 4 instructions.
+vec2 detail_uv(vec2 uv, mat2x2 matrix, vec2 offset) {
+    return (matrix * uv) + offset;
+}
+
+/// Signs that mirrored tiling gives the directions in a tile at `uv`: −1 along an axis in every other tile.
+///
+/// Cost on GCN: 6 instructions.
+vec2 detail_mirror(vec2 uv) {
+    return vec2(1.0) - (4.0 * fract((0.5 * floor(uv))));
+}
+
+/// Opacity of a layer: the mask's contrast raised around 1/2. `contrast` 1 leaves it as it is, 0 makes it 1/2.
+///
+/// Cost on GCN: 2 instructions.
+float detail_mask(float mask, float contrast) {
+    return clamp((((mask - 0.5) * contrast) + 0.5), 0.0, 1.0);
+}
+
+/// A tile's normal in the mesh's tangent space. `rotation` is the cosine and sine of the layer's rotation, `mirror` what
+/// `detail_mirror` says, or ones. A change of scale leaves slopes as they are.
+///
+/// Cost on GCN: 6 instructions.
+vec3 detail_turn_normal(vec3 n, vec2 rotation, vec2 mirror) {
+    vec2 xy = n.xy * mirror;
+    return vec3(((rotation.x * xy.x) + (rotation.y * xy.y)), ((rotation.x * xy.y) - (rotation.y * xy.x)), n.z);
+}
+
+/// A tile's aniso texel in the mesh's tangent space; as `detail_turn_normal`.
+///
+/// Cost on GCN: 32 instructions (3 at a quarter of the rate).
+vec3 detail_turn_aniso(vec3 texel, vec2 rotation, vec2 mirror) {
+    vec3 _e3 = aniso_decode_matrix(texel);
+    float xy = (_e3.y * mirror.x) * mirror.y;
+    float c = rotation.x;
+    float s = rotation.y;
+    float across = ((2.0 * c) * s) * xy;
+    vec3 _e42 = aniso_encode(vec3(((((c * c) * _e3.x) + across) + ((s * s) * _e3.z)), (((c * s) * (_e3.z - _e3.x)) + (((c * c) - (s * s)) * xy)), ((((s * s) * _e3.x) - across) + ((c * c) * _e3.z))));
+    return _e42;
 }
 
 #endif

@@ -10,6 +10,18 @@ pub mod wesl {
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../src/beckmann.wesl");
 
+    /// The module `detail_hsv`.
+    pub const DETAIL_HSV: &str = include_str!("../src/detail_hsv.wesl");
+
+    /// The module `detail_normal`.
+    pub const DETAIL_NORMAL: &str = include_str!("../src/detail_normal.wesl");
+
+    /// The module `detail_over`.
+    pub const DETAIL_OVER: &str = include_str!("../src/detail_over.wesl");
+
+    /// The module `detail_overlay`.
+    pub const DETAIL_OVERLAY: &str = include_str!("../src/detail_overlay.wesl");
+
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../src/frame.wesl");
 
@@ -25,6 +37,9 @@ pub mod wesl {
     /// The module `aniso`.
     pub const ANISO: &str = include_str!("../src/aniso.wesl");
 
+    /// The module `detail_layer`.
+    pub const DETAIL_LAYER: &str = include_str!("../src/detail_layer.wesl");
+
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../src/ggx.wesl");
 
@@ -34,11 +49,16 @@ pub mod wesl {
     /// The modules, each after those it needs.
     pub const MODULES: &[Module] = &[
         Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "detail_hsv", text: DETAIL_HSV, needs: &[] },
+        Module { name: "detail_normal", text: DETAIL_NORMAL, needs: &[] },
+        Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
+        Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];
@@ -53,6 +73,18 @@ pub mod wgsl {
 
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../wgsl/beckmann.wgsl");
+
+    /// The module `detail_hsv`.
+    pub const DETAIL_HSV: &str = include_str!("../wgsl/detail_hsv.wgsl");
+
+    /// The module `detail_normal`.
+    pub const DETAIL_NORMAL: &str = include_str!("../wgsl/detail_normal.wgsl");
+
+    /// The module `detail_over`.
+    pub const DETAIL_OVER: &str = include_str!("../wgsl/detail_over.wgsl");
+
+    /// The module `detail_overlay`.
+    pub const DETAIL_OVERLAY: &str = include_str!("../wgsl/detail_overlay.wgsl");
 
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../wgsl/frame.wgsl");
@@ -69,6 +101,9 @@ pub mod wgsl {
     /// The module `aniso`.
     pub const ANISO: &str = include_str!("../wgsl/aniso.wgsl");
 
+    /// The module `detail_layer`.
+    pub const DETAIL_LAYER: &str = include_str!("../wgsl/detail_layer.wgsl");
+
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../wgsl/ggx.wgsl");
 
@@ -81,11 +116,16 @@ pub mod wgsl {
     /// The modules, each after those it needs.
     pub const MODULES: &[Module] = &[
         Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "detail_hsv", text: DETAIL_HSV, needs: &[] },
+        Module { name: "detail_normal", text: DETAIL_NORMAL, needs: &[] },
+        Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
+        Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];
@@ -100,6 +140,18 @@ pub mod glsl_450 {
 
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../glsl_450/beckmann.glsl");
+
+    /// The module `detail_hsv`.
+    pub const DETAIL_HSV: &str = include_str!("../glsl_450/detail_hsv.glsl");
+
+    /// The module `detail_normal`.
+    pub const DETAIL_NORMAL: &str = include_str!("../glsl_450/detail_normal.glsl");
+
+    /// The module `detail_over`.
+    pub const DETAIL_OVER: &str = include_str!("../glsl_450/detail_over.glsl");
+
+    /// The module `detail_overlay`.
+    pub const DETAIL_OVERLAY: &str = include_str!("../glsl_450/detail_overlay.glsl");
 
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../glsl_450/frame.glsl");
@@ -116,6 +168,9 @@ pub mod glsl_450 {
     /// The module `aniso`.
     pub const ANISO: &str = include_str!("../glsl_450/aniso.glsl");
 
+    /// The module `detail_layer`.
+    pub const DETAIL_LAYER: &str = include_str!("../glsl_450/detail_layer.glsl");
+
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../glsl_450/ggx.glsl");
 
@@ -128,11 +183,16 @@ pub mod glsl_450 {
     /// The modules, each after those it needs.
     pub const MODULES: &[Module] = &[
         Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "detail_hsv", text: DETAIL_HSV, needs: &[] },
+        Module { name: "detail_normal", text: DETAIL_NORMAL, needs: &[] },
+        Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
+        Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];
@@ -147,6 +207,18 @@ pub mod glsl_es_300 {
 
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../glsl_es_300/beckmann.glsl");
+
+    /// The module `detail_hsv`.
+    pub const DETAIL_HSV: &str = include_str!("../glsl_es_300/detail_hsv.glsl");
+
+    /// The module `detail_normal`.
+    pub const DETAIL_NORMAL: &str = include_str!("../glsl_es_300/detail_normal.glsl");
+
+    /// The module `detail_over`.
+    pub const DETAIL_OVER: &str = include_str!("../glsl_es_300/detail_over.glsl");
+
+    /// The module `detail_overlay`.
+    pub const DETAIL_OVERLAY: &str = include_str!("../glsl_es_300/detail_overlay.glsl");
 
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../glsl_es_300/frame.glsl");
@@ -163,6 +235,9 @@ pub mod glsl_es_300 {
     /// The module `aniso`.
     pub const ANISO: &str = include_str!("../glsl_es_300/aniso.glsl");
 
+    /// The module `detail_layer`.
+    pub const DETAIL_LAYER: &str = include_str!("../glsl_es_300/detail_layer.glsl");
+
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../glsl_es_300/ggx.glsl");
 
@@ -175,11 +250,16 @@ pub mod glsl_es_300 {
     /// The modules, each after those it needs.
     pub const MODULES: &[Module] = &[
         Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "detail_hsv", text: DETAIL_HSV, needs: &[] },
+        Module { name: "detail_normal", text: DETAIL_NORMAL, needs: &[] },
+        Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
+        Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];
@@ -194,6 +274,18 @@ pub mod hlsl {
 
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../hlsl/beckmann.hlsl");
+
+    /// The module `detail_hsv`.
+    pub const DETAIL_HSV: &str = include_str!("../hlsl/detail_hsv.hlsl");
+
+    /// The module `detail_normal`.
+    pub const DETAIL_NORMAL: &str = include_str!("../hlsl/detail_normal.hlsl");
+
+    /// The module `detail_over`.
+    pub const DETAIL_OVER: &str = include_str!("../hlsl/detail_over.hlsl");
+
+    /// The module `detail_overlay`.
+    pub const DETAIL_OVERLAY: &str = include_str!("../hlsl/detail_overlay.hlsl");
 
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../hlsl/frame.hlsl");
@@ -210,6 +302,9 @@ pub mod hlsl {
     /// The module `aniso`.
     pub const ANISO: &str = include_str!("../hlsl/aniso.hlsl");
 
+    /// The module `detail_layer`.
+    pub const DETAIL_LAYER: &str = include_str!("../hlsl/detail_layer.hlsl");
+
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../hlsl/ggx.hlsl");
 
@@ -222,11 +317,16 @@ pub mod hlsl {
     /// The modules, each after those it needs.
     pub const MODULES: &[Module] = &[
         Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "detail_hsv", text: DETAIL_HSV, needs: &[] },
+        Module { name: "detail_normal", text: DETAIL_NORMAL, needs: &[] },
+        Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
+        Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];
@@ -241,6 +341,18 @@ pub mod msl {
 
     /// The module `beckmann`.
     pub const BECKMANN: &str = include_str!("../msl/beckmann.h");
+
+    /// The module `detail_hsv`.
+    pub const DETAIL_HSV: &str = include_str!("../msl/detail_hsv.h");
+
+    /// The module `detail_normal`.
+    pub const DETAIL_NORMAL: &str = include_str!("../msl/detail_normal.h");
+
+    /// The module `detail_over`.
+    pub const DETAIL_OVER: &str = include_str!("../msl/detail_over.h");
+
+    /// The module `detail_overlay`.
+    pub const DETAIL_OVERLAY: &str = include_str!("../msl/detail_overlay.h");
 
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../msl/frame.h");
@@ -257,6 +369,9 @@ pub mod msl {
     /// The module `aniso`.
     pub const ANISO: &str = include_str!("../msl/aniso.h");
 
+    /// The module `detail_layer`.
+    pub const DETAIL_LAYER: &str = include_str!("../msl/detail_layer.h");
+
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../msl/ggx.h");
 
@@ -269,11 +384,16 @@ pub mod msl {
     /// The modules, each after those it needs.
     pub const MODULES: &[Module] = &[
         Module { name: "beckmann", text: BECKMANN, needs: &[] },
+        Module { name: "detail_hsv", text: DETAIL_HSV, needs: &[] },
+        Module { name: "detail_normal", text: DETAIL_NORMAL, needs: &[] },
+        Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
+        Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
+        Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];

@@ -10,6 +10,7 @@
 
 mod aniso;
 mod beckmann;
+pub mod detail;
 mod frame;
 mod ggx;
 mod multiscatter;

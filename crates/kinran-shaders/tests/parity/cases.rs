@@ -1,5 +1,7 @@
 //! Which twin each shader function has, what to feed both, and how far they may differ.
 
+mod detail;
+
 use fastrand::Rng;
 use glam::{Mat3, Vec2, Vec3, vec2, vec3};
 use kinran_shading::{self as rust, Sym2, Sym3, sh};
@@ -537,5 +539,6 @@ pub(crate) fn cases() -> Vec<Case> {
             of3(sh::sh_irradiance(&sh9(x), v3(&x[27..])))
         }),
     ]);
+    cases.extend(detail::cases());
     cases
 }

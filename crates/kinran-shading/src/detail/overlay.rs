@@ -1,0 +1,98 @@
+//! Overlay and the talk's smooth overlay, with their inverses.
+//!
+//! Both are non-decreasing in `s` with f(0) = 0 and f(1) = 1 for every `d`, so every target is reached. The
+//! solution is unique but for two plateaus, d = t = 0 (any s ≤ 1/2) and d = t = 1 (any s ≥ 1/2), where 1/2 is
+//! chosen: a detail equal to its target asks for nothing.
+
+use crate::sqrt::sqrt;
+use glam::Vec3;
+
+/// Divisors below this are zeros whose quotient is not used.
+const TINY: f32 = 1e-30;
+
+/// Overlay of a detail `d` by a synthesized value `s`, both in [0, 1] (slide: Detail Maps | Our Approach):
+/// `2sd` below s = 1/2, `1 - 2(1-s)(1-d)` from there on.
+#[inline(always)]
+pub fn overlay(s: f32, d: f32) -> f32 {
+    if s < 0.5 { 2.0 * s * d } else { 1.0 - 2.0 * (1.0 - s) * (1.0 - d) }
+}
+
+/// [`overlay`] of each channel.
+#[inline(always)]
+pub fn overlay_color(s: Vec3, d: Vec3) -> Vec3 {
+    Vec3::new(overlay(s.x, d.x), overlay(s.y, d.y), overlay(s.z, d.z))
+}
+
+/// The `s` with `overlay(s, d) = t`, for `t` and `d` in [0, 1].
+#[inline(always)]
+pub fn overlay_inverse(t: f32, d: f32) -> f32 {
+    let lower = t / (2.0 * d).max(TINY);
+    let upper = 1.0 - (1.0 - t) / (2.0 * (1.0 - d)).max(TINY);
+    if t < d {
+        lower
+    } else if d >= 1.0 {
+        0.5
+    } else {
+        upper
+    }
+}
+
+/// Derivative of [`overlay`] by `s`; at the kink, that above it.
+#[inline(always)]
+pub fn overlay_slope(s: f32, d: f32) -> f32 {
+    2.0 * if s < 0.5 { d } else { 1.0 - d }
+}
+
+/// The talk's smooth overlay, finer near `t = d` where a dark detail is brightened (slide: Detail Maps |
+/// Blending): as [`overlay`], but `lerp(2sd, s, (2s-1)²)` where s ≥ 1/2 and d < 1/2.
+///
+/// For d ≤ 1/2 the slope is continuous at s = 1/2; above, the kink of overlay remains.
+#[inline(always)]
+pub fn smooth_overlay(s: f32, d: f32) -> f32 {
+    let x = 2.0 * s - 1.0;
+    let low = 2.0 * s * d;
+    let bright = 1.0 - 2.0 * (1.0 - s) * (1.0 - d);
+    let dark = low + (s - low) * x * x;
+    if s < 0.5 {
+        low
+    } else if d < 0.5 {
+        dark
+    } else {
+        bright
+    }
+}
+
+/// [`smooth_overlay`] of each channel.
+#[inline(always)]
+pub fn smooth_overlay_color(s: Vec3, d: Vec3) -> Vec3 {
+    Vec3::new(smooth_overlay(s.x, d.x), smooth_overlay(s.y, d.y), smooth_overlay(s.z, d.z))
+}
+
+/// The `s` with `smooth_overlay(s, d) = t`, for `t` and `d` in [0, 1]: `smooth_overlay` of it is within 3e-7 of
+/// `t`.
+///
+/// Where t ≥ d and d < 1/2, with `x = 2s - 1`, `a = 1 - 2d` and `e = t - d` it is the root of
+/// `d x + a x²/2 + a x³/2 = e` in [0, 1]. Newton's method starts from the root without the cubic term, which lies
+/// above, and since the left side is convex it comes down without overshooting; four steps reach single precision.
+/// (In `s` the cubic `4a s³ - 4a s² + s - t` cancels near d = 0, and has three real roots for d < 1/8.)
+#[inline(always)]
+pub fn smooth_overlay_inverse(t: f32, d: f32) -> f32 {
+    let (a, e) = (1.0 - 2.0 * d, t - d);
+    let mut x = (2.0 * e / (d + sqrt((d * d + 2.0 * a * e).max(0.0))).max(TINY)).min(1.0);
+    for _ in 0..4 {
+        let excess = x * (d + 0.5 * a * x * (1.0 + x)) - e;
+        let slope = d + a * x * (1.0 + 1.5 * x);
+        x -= excess / slope.max(TINY);
+    }
+    let plain = overlay_inverse(t, d);
+    if t >= d && d < 0.5 { 0.5 + 0.5 * x } else { plain }
+}
+
+/// Derivative of [`smooth_overlay`] by `s`; at a kink, that above it.
+#[inline(always)]
+pub fn smooth_overlay_slope(s: f32, d: f32) -> f32 {
+    let (a, x) = (1.0 - 2.0 * d, 2.0 * s - 1.0);
+    let dark = 2.0 * d + a * x * (2.0 + 3.0 * x);
+    let plain = overlay_slope(s, d);
+    if s >= 0.5 && d < 0.5 { dark } else { plain }
+}
