@@ -427,6 +427,16 @@ fn list(folder: &Path) -> Result<(Vec<Found>, Vec<String>), FolderError> {
     Ok((found, others))
 }
 
+/// The image files of a folder that a name tells the role of, by name, with the way green points where the name says
+/// that too. No question is asked and no file opened; see [`scan`] for materials.
+///
+/// # Errors
+/// [`FolderError::NotAFolder`], or the folder cannot be read.
+pub fn named_maps(folder: &Path) -> Result<Vec<(PathBuf, Role, Option<Green>)>, FolderError> {
+    let (found, _) = list(folder)?;
+    Ok(found.into_iter().filter_map(|file| Some((file.path, file.role?, file.name.green))).collect())
+}
+
 fn is_image(path: &Path) -> bool {
     path.extension().is_some_and(|e| EXTENSIONS.iter().any(|known| e.eq_ignore_ascii_case(known)))
 }

@@ -2,6 +2,7 @@
 
 pub mod aniso;
 mod channels;
+pub mod detail;
 pub mod folder;
 mod material;
 mod mips;

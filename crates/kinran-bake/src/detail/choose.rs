@@ -1,0 +1,263 @@
+//! Which block of several to keep: the one whose blended result is nearest to the target.
+//!
+//! An encoder sees `s` alone and weighs all texels alike. But the blend has slope 0.1 here and 4 there, and texels
+//! next to each other have different tiles under them, so of many blocks equally near to `s` one is much nearer to the
+//! target than the others.
+
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over lanes of known length are what compilers vectorise"
+)]
+
+use kinran_image::Format;
+
+use super::code::code_from_linear;
+use super::map::MapKind;
+use super::solve::{Blend, Operator, Plain, Smooth};
+
+/// Texels of a block.
+const TEXELS: usize = 16;
+
+/// The blocks of a band of one level.
+pub(crate) struct ChooseBand<'a> {
+    /// Texels in a row.
+    pub(crate) width: usize,
+    /// Rows of the target's three planes, four for each row of blocks but the last.
+    pub(crate) target: Vec<[&'a [f32]; 3]>,
+    /// Rows of the detail that was solved against.
+    pub(crate) detail: &'a [[Vec<f32>; 3]],
+    pub(crate) kind: MapKind,
+    pub(crate) blend: Blend,
+    /// What an encoder made of `s`.
+    pub(crate) blocks: &'a mut [u8],
+}
+
+impl pulp::WithSimd for ChooseBand<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        match self.blend {
+            Blend::Smooth => self.choose(Smooth),
+            Blend::Plain => self.choose(Plain),
+        }
+    }
+}
+
+impl ChooseBand<'_> {
+    #[inline(always)]
+    fn choose(self, blend: impl Operator) {
+        let columns = self.width.div_ceil(4);
+        for (i, block) in self.blocks.as_chunks_mut::<8>().0.iter_mut().enumerate() {
+            let (x0, y0) = (i % columns * 4, i / columns * 4);
+            let mut goal = BlockGoal::zeros();
+            for (y, (target, detail)) in self.target[y0..].iter().zip(&self.detail[y0..]).take(4).enumerate()
+            {
+                for x in 0..4.min(self.width - x0) {
+                    for channel in 0..3 {
+                        goal.t[channel][4 * y + x] = target[channel][x0 + x];
+                        goal.d[channel][4 * y + x] = detail[channel][x0 + x];
+                        goal.gain[channel][4 * y + x] = code_gain(self.kind, target[channel][x0 + x]);
+                    }
+                }
+            }
+            for channel in 0..3 {
+                for i in 0..TEXELS {
+                    goal.s[channel][i] = blend.inverse(goal.t[channel][i], goal.d[channel][i]);
+                }
+            }
+            choose_bc1(block, &goal, blend);
+        }
+    }
+}
+
+/// What a block of `s` should achieve, for colour and data, texels row by row.
+struct BlockGoal {
+    /// The exact solution.
+    s: [[f32; TEXELS]; 3],
+    /// The detail.
+    d: [[f32; TEXELS]; 3],
+    /// The target.
+    t: [[f32; TEXELS]; 3],
+    /// Steps of 8 bits for a difference of one in the blended value; zero outside of the image.
+    gain: [[f32; TEXELS]; 3],
+}
+
+impl BlockGoal {
+    fn zeros() -> Self {
+        let zeros = [[0.0; TEXELS]; 3];
+        BlockGoal { s: zeros, d: zeros, t: zeros, gain: zeros }
+    }
+}
+
+/// Steps of 8 bits of the map's code for a small difference at the target `t`: for colour the slope of the sRGB curve.
+#[inline(always)]
+fn code_gain(kind: MapKind, t: f32) -> f32 {
+    let curve = (code_from_linear(t) + 0.055) / (2.4 * t.max(1e-6));
+    let slope = if t <= 0.003_130_8 { 12.92 } else { curve };
+    255.0 * if kind == MapKind::Color { slope } else { 1.0 }
+}
+
+/// Formats in which blocks are chosen by what they are blended to.
+pub(crate) fn can_choose(format: Format, kind: MapKind) -> bool {
+    format == Format::Bc1 && matches!(kind, MapKind::Color | MapKind::Data)
+}
+
+/// Rounds of fitting end points to the texels that chose them. The third gains less than a thousandth.
+const ROUNDS: usize = 2;
+
+/// Replaces a BC1 block by one whose blended result is nearer to the target, if there is one: texels choose again among
+/// its four colours by what they are blended to; then the end points follow by least squares, weighted by the slope of
+/// the blend; and so on. `slope` is the blend's derivative.
+#[inline(always)]
+fn choose_bc1(block: &mut [u8; 8], goal: &BlockGoal, blend: impl Operator) {
+    let ends = [u16::from_le_bytes([block[0], block[1]]), u16::from_le_bytes([block[2], block[3]])];
+    // The mode with three colours and black is not for maps without holes.
+    if ends[0] < ends[1] {
+        return;
+    }
+    let weights = weights(goal, blend);
+    let mut best = assign(ends, goal, blend);
+    for _ in 0..ROUNDS {
+        let ends = fit(&best.choices, goal, &weights);
+        if ends == best.ends {
+            break;
+        }
+        let fitted = assign(ends, goal, blend);
+        if fitted.error >= best.error {
+            break;
+        }
+        best = fitted;
+    }
+    best.write(block);
+}
+
+/// A block's end points and what each texel takes of them.
+#[derive(Clone, Copy)]
+struct Candidate {
+    ends: [u16; 2],
+    choices: [u8; TEXELS],
+    error: f32,
+}
+
+impl Candidate {
+    fn write(&self, block: &mut [u8; 8]) {
+        let Candidate { mut ends, choices, .. } = *self;
+        // Four colours take the larger end first; exchanged, the four choices exchange in pairs.
+        let exchange = ends[0] < ends[1];
+        if exchange {
+            ends.swap(0, 1);
+        }
+        let all = ends[0] == ends[1];
+        let mut bits = 0_u32;
+        for (i, choice) in choices.into_iter().enumerate() {
+            let choice = if all { 0 } else { u32::from(choice) ^ u32::from(exchange) };
+            bits |= choice << (2 * i);
+        }
+        block[..2].copy_from_slice(&ends[0].to_le_bytes());
+        block[2..4].copy_from_slice(&ends[1].to_le_bytes());
+        block[4..].copy_from_slice(&bits.to_le_bytes());
+    }
+}
+
+/// The three channels of a 5:6:5 colour as whole numbers.
+#[inline(always)]
+fn channels(end: u16) -> [u16; 3] {
+    [end >> 11, end >> 5 & 63, end & 31]
+}
+
+/// The largest number of each channel.
+const LARGEST: [f32; 3] = [31.0, 63.0, 31.0];
+
+/// Shares of the first end in the four colours.
+const SHARES: [f32; 4] = [1.0, 0.0, 2.0 / 3.0, 1.0 / 3.0];
+
+/// The four values of `s` in a channel, with the 8 bits that decoders round to.
+#[inline(always)]
+fn palette(ends: [u16; 2], channel: usize) -> [f32; 4] {
+    let (a, b) = (f32::from(channels(ends[0])[channel]), f32::from(channels(ends[1])[channel]));
+    SHARES.map(|share| {
+        let byte = ((b + (a - b) * share) * (255.0 / LARGEST[channel]) + 0.5) as u8;
+        (f32::from(byte) * (1.0 / 254.0) - 1.0 / 254.0).max(0.0)
+    })
+}
+
+/// Lets each texel take the colour that is blended nearest to its target.
+#[inline(always)]
+fn assign(ends: [u16; 2], goal: &BlockGoal, blend: impl Operator) -> Candidate {
+    let palettes: [[f32; 4]; 3] = [palette(ends, 0), palette(ends, 1), palette(ends, 2)];
+    let mut least = [f32::INFINITY; TEXELS];
+    let mut choices = [0_i32; TEXELS];
+    for choice in 0..4 {
+        let mut errors = [0.0; TEXELS];
+        for channel in 0..3 {
+            let s = palettes[channel][choice];
+            let (d, t, gain) = (&goal.d[channel], &goal.t[channel], &goal.gain[channel]);
+            for i in 0..TEXELS {
+                let difference = (blend.blend(s, d[i]) - t[i]) * gain[i];
+                errors[i] += difference * difference;
+            }
+        }
+        for i in 0..TEXELS {
+            let better = errors[i] < least[i];
+            choices[i] = if better { choice as i32 } else { choices[i] };
+            least[i] = if better { errors[i] } else { least[i] };
+        }
+    }
+    Candidate { ends, choices: choices.map(|c| c as u8), error: sum(&least) }
+}
+
+/// What a small error of `s` costs, squared.
+#[inline(always)]
+fn weights(goal: &BlockGoal, blend: impl Operator) -> [[f32; TEXELS]; 3] {
+    let mut weights = [[0.0; TEXELS]; 3];
+    for channel in 0..3 {
+        for i in 0..TEXELS {
+            let step = blend.slope(goal.s[channel][i], goal.d[channel][i]) * goal.gain[channel][i];
+            weights[channel][i] = step * step;
+        }
+    }
+    weights
+}
+
+/// The end points nearest to the exact solution, given what each texel takes of them.
+#[inline(always)]
+fn fit(choices: &[u8; TEXELS], goal: &BlockGoal, weights: &[[f32; TEXELS]; 3]) -> [u16; 2] {
+    let shares = choices.map(|choice| SHARES[usize::from(choice)]);
+    let mut ends = [0_u16; 2];
+    for channel in 0..3 {
+        let (s, w) = (&goal.s[channel], &weights[channel]);
+        let sum_of = |term: &dyn Fn(usize) -> f32| sum(&std::array::from_fn(term));
+        let aa = sum_of(&|i| w[i] * shares[i] * shares[i]);
+        let ab = sum_of(&|i| w[i] * shares[i] * (1.0 - shares[i]));
+        let bb = sum_of(&|i| w[i] * (1.0 - shares[i]) * (1.0 - shares[i]));
+        let sa = sum_of(&|i| w[i] * shares[i] * s[i]);
+        let sb = sum_of(&|i| w[i] * (1.0 - shares[i]) * s[i]);
+        let determinant = aa * bb - ab * ab;
+        // Of a channel that weighs nothing, or all of whose texels took one colour, the mean is all there is to know.
+        let (a, b) = if determinant > 1e-4 * (aa + bb) * (aa + bb) {
+            ((sa * bb - sb * ab) / determinant, (sb * aa - sa * ab) / determinant)
+        } else {
+            let mean = (sa + sb) / (aa + 2.0 * ab + bb).max(1e-20);
+            (mean, mean)
+        };
+        let bits = [11, 5, 0][channel];
+        for (end, value) in ends.iter_mut().zip([a, b]) {
+            let texel = (value.clamp(0.0, 1.0) * 254.0 + 1.0) / 255.0;
+            *end |= ((texel * LARGEST[channel] + 0.5) as u16) << bits;
+        }
+    }
+    ends
+}
+
+/// A sum in a fixed order that runs in lanes.
+#[inline(always)]
+fn sum(values: &[f32; TEXELS]) -> f32 {
+    let mut lanes: [f32; 8] = std::array::from_fn(|i| values[i] + values[i + 8]);
+    for half in [4, 2, 1] {
+        for i in 0..half {
+            lanes[i] += lanes[i + half];
+        }
+    }
+    lanes[0]
+}

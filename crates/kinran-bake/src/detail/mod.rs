@@ -1,0 +1,40 @@
+//! Detail maps, solved by inversion: given an authored target and the tiled layers that will lie over it, find the map
+//! `s` with `s ⊗ detail = target` (slides: Detail Maps).
+//!
+//! ```no_run
+//! # use kinran_bake::detail::*;
+//! # use kinran_image::{Encoder, Encoding, Format, Preset, read_image};
+//! # fn main() -> Result<(), kinran_image::Error> {
+//! let bc1 = Encoding { format: Format::Bc1, encoder: Encoder::Portable, preset: Preset::Normal };
+//! let tile = Tile::new(&read_image("steel.png".as_ref())?, TileOptions::new(MapKind::Color, bc1))?;
+//! let target = Target::new(&read_image("helmet.png".as_ref())?, MapKind::Color, false)?;
+//! let mut layer = Layer::new(&tile);
+//! layer.transform.scale = glam::Vec2::splat(4.0);
+//! let solved = solve(&target, &[layer], &DetailOptions::new(bc1), &|_| {})?;
+//! println!("RMSE {}", solved.levels[0].error);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The solver does at every texel what the runtime will do there (`kinran_shading::detail`): fetch each layer with its
+//! transform and level of detail, shift its colour or turn its direction, mix the layers by their masks; then it inverts
+//! the blend. Levels of `s` are solved one by one against the layers' own levels as the GPU decodes them, so that `s`
+//! takes back what the tile's compression did; only the finest level, which is magnified against many levels of the
+//! tile, is solved against the tile before compression, as in the talk.
+
+mod choose;
+mod code;
+mod compare;
+mod layer;
+mod map;
+mod paint;
+mod pictures;
+mod sample;
+mod solve;
+
+pub use compare::{Comparison, LevelComparison, LowestResolution, Resolution, compare, lowest_resolution};
+pub use layer::{Layer, LayerTransform, MAX_LAYERS, Mask, Tile, TileOptions, texture_bytes};
+pub use map::{MapKind, Planes};
+pub use paint::{Paint, PaintGuides};
+pub use pictures::{ERROR_GAIN, LevelPictures, level_pictures};
+pub use solve::{Blend, DetailOptions, LevelError, Solved, Target, solve, synthesize};

@@ -1,0 +1,504 @@
+//! The solver: every texel's `s`, compressed, and how far the blended result is from the target.
+
+use glam::{Vec3, vec3};
+use kinran_image::{Channels, Encoding, Error, Format, Image, Level, Texture, Transfer, decode, encode};
+use kinran_shading::detail::{
+    detail_from_texel, detail_over, detail_over_inverse, overlay, overlay_color, overlay_inverse,
+    overlay_slope, rnm, rnm_inverse, smooth_overlay, smooth_overlay_color, smooth_overlay_inverse,
+    smooth_overlay_slope,
+};
+use kinran_shading::normal_from_xy;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::choose::{ChooseBand, can_choose};
+use super::code::code_from_linear;
+use super::layer::{DetailRows, Layer, RowRoom, Seen, check_layers};
+use super::map::{MapKind, Planes, mip_chain, planes_of_image, texture};
+
+/// How colour and data are blended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Blend {
+    /// The talk's smooth overlay.
+    #[default]
+    Smooth,
+    /// Plain overlay.
+    Plain,
+}
+
+/// An overlay, its inverse and its slope.
+pub(crate) trait Operator: Copy {
+    fn blend(self, s: f32, d: f32) -> f32;
+    fn inverse(self, t: f32, d: f32) -> f32;
+    fn slope(self, s: f32, d: f32) -> f32;
+}
+
+/// The talk's.
+#[derive(Clone, Copy)]
+pub(crate) struct Smooth;
+
+/// Overlay as it is.
+#[derive(Clone, Copy)]
+pub(crate) struct Plain;
+
+impl Operator for Smooth {
+    #[inline(always)]
+    fn blend(self, s: f32, d: f32) -> f32 {
+        smooth_overlay(s, d)
+    }
+    #[inline(always)]
+    fn inverse(self, t: f32, d: f32) -> f32 {
+        smooth_overlay_inverse(t, d)
+    }
+    #[inline(always)]
+    fn slope(self, s: f32, d: f32) -> f32 {
+        smooth_overlay_slope(s, d)
+    }
+}
+
+impl Operator for Plain {
+    #[inline(always)]
+    fn blend(self, s: f32, d: f32) -> f32 {
+        overlay(s, d)
+    }
+    #[inline(always)]
+    fn inverse(self, t: f32, d: f32) -> f32 {
+        overlay_inverse(t, d)
+    }
+    #[inline(always)]
+    fn slope(self, s: f32, d: f32) -> f32 {
+        overlay_slope(s, d)
+    }
+}
+
+/// How a target is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DetailOptions {
+    /// For colour and data.
+    pub blend: Blend,
+    /// Opacity of the detail over an aniso target, 0 to 1: the shader's parameter.
+    pub aniso_alpha: f32,
+    /// Solves against the tiles as the GPU decodes them, below the finest level. Off: against the tiles as authored.
+    pub compensate: bool,
+    /// Chooses among blocks of `s` by the error of the blended result: BC1 of colour and data. Off: keeps what the
+    /// encoder made.
+    pub choose: bool,
+    /// How `s` is compressed.
+    pub encoding: Encoding,
+    /// Levels of the target left out of `s`: its finest is this one.
+    pub first_level: usize,
+}
+
+impl DetailOptions {
+    /// Everything that lowers the error, at the target's own resolution; the aniso detail half opaque.
+    pub fn new(encoding: Encoding) -> Self {
+        DetailOptions {
+            blend: Blend::Smooth,
+            aniso_alpha: 0.5,
+            compensate: true,
+            choose: true,
+            encoding,
+            first_level: 0,
+        }
+    }
+}
+
+/// A map to be reproduced, with its mips.
+#[derive(Clone, Debug)]
+pub struct Target {
+    /// What it holds.
+    pub kind: MapKind,
+    /// Whether its three channels are one.
+    pub grey: bool,
+    /// Whether an alpha below one is among its texels; it passes through to `s` unblended.
+    pub alpha: bool,
+    /// Level 0 first, each an average of level 0.
+    pub levels: Vec<Planes>,
+}
+
+impl Target {
+    /// A target of any size from an image of 8 or 16 bits or floats; float colour is linear light.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where a sample lies outside [0, 1] or the kind asks for more channels than the image has.
+    pub fn new(image: &Image, kind: MapKind, y_down: bool) -> Result<Self, Error> {
+        let levels = mip_chain(planes_of_image(image, kind, y_down)?, kind);
+        let grey = kind == MapKind::Data && matches!(image.channels, Channels::R | Channels::Rg);
+        let alpha =
+            matches!(kind, MapKind::Color | MapKind::Data) && levels[0].plane(3).iter().any(|&a| a < 1.0);
+        Ok(Target { kind, grey, alpha, levels })
+    }
+
+    /// Channels of which errors are measured.
+    fn measured(&self) -> usize {
+        if self.grey { 1 } else { 3 }
+    }
+
+    /// Refuses a format that cannot hold a map of this kind.
+    pub(crate) fn check_format(&self, format: Format) -> Result<(), Error> {
+        let fits = match (self.kind, format) {
+            (_, Format::Bc7 | Format::Rgba8) => true,
+            (MapKind::Normal, Format::Bc5) => true,
+            (MapKind::Data, Format::Bc4) => self.grey && !self.alpha,
+            (MapKind::Color | MapKind::Data | MapKind::Aniso, Format::Bc1) => !self.alpha,
+            _ => false,
+        };
+        if fits {
+            return Ok(());
+        }
+        let alpha = if self.alpha { " with alpha" } else { "" };
+        Err(Error::Unsupported(format!(
+            "{format:?} does not hold a map of kind {:?}{alpha}; take BC7 or RGBA8",
+            self.kind
+        )))
+    }
+}
+
+/// What one level of `s` became.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct LevelError {
+    /// Texels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Root mean square difference between the blended result, both textures decoded, and the target: in steps of 8
+    /// bits (of the sRGB code, for colour), or for normals in degrees.
+    pub error: f32,
+    /// Share of texels whose target cannot be reached exactly: normals that `s` would need below the horizon, aniso
+    /// texels outside what the alpha leaves.
+    pub unreached: f32,
+}
+
+/// A solved target.
+#[derive(Clone, Debug)]
+pub struct Solved {
+    /// `s` and its mips. Colour, data and normals are stored so that byte 128 is neutral, see
+    /// [`detail_from_texel`]; never sRGB.
+    pub texture: Texture,
+    /// For each level of `s`.
+    pub levels: Vec<LevelError>,
+}
+
+/// Rows in a band: the unit of parallel work, whole blocks.
+const BAND: usize = 16;
+
+/// Solves a target against its layers, all levels from `options.first_level` down, in parallel; `progress` is told how
+/// many texels were finished since it was last called. The bytes do not depend on the number of threads.
+///
+/// # Errors
+/// [`Error::Unsupported`] where layers and target do not fit together, an option is out of range, the format cannot
+/// hold the kind, or the encoder refuses.
+pub fn solve(
+    target: &Target,
+    layers: &[Layer],
+    options: &DetailOptions,
+    progress: &(impl Fn(u64) + Sync),
+) -> Result<Solved, Error> {
+    check_layers(layers, target.kind)?;
+    target.check_format(options.encoding.format)?;
+    if !(0.0..=1.0).contains(&options.aniso_alpha) {
+        return Err(Error::Unsupported(format!(
+            "the aniso alpha is an opacity from 0 to 1, got {}",
+            options.aniso_alpha
+        )));
+    }
+    if options.first_level >= target.levels.len() {
+        return Err(Error::Unsupported(format!(
+            "the target has {} levels, so level {} cannot be the finest of s",
+            target.levels.len(),
+            options.first_level
+        )));
+    }
+
+    let mut levels = Vec::new();
+    let mut errors = Vec::new();
+    for level in options.first_level..target.levels.len() {
+        let compensated = options.compensate && level > options.first_level;
+        let (data, error) = solve_level(target, layers, options, level, compensated, progress)?;
+        let (width, height) = (target.levels[level].width, target.levels[level].height);
+        levels.push(Level { width, height, data });
+        errors.push(error);
+    }
+    Ok(Solved { texture: texture(options.encoding.format, Transfer::Linear, levels), levels: errors })
+}
+
+/// The texels of one level of `s` before compression, RGBA of 8 bits as [`Solved::texture`] stores them, on the calling
+/// thread alone: solved against the tiles as the GPU decodes them.
+///
+/// # Errors
+/// As [`solve`].
+pub fn synthesize(
+    target: &Target,
+    layers: &[Layer],
+    options: &DetailOptions,
+    level: usize,
+) -> Result<Vec<u8>, Error> {
+    check_layers(layers, target.kind)?;
+    let Some(planes) = target.levels.get(level) else {
+        return Err(Error::Unsupported(format!("the target has no level {level}")));
+    };
+    let width = planes.width as usize;
+    let rows = DetailRows::new(layers, target.kind, (planes.width, planes.height), Seen::Decoded);
+    let (mut room, mut detail) = (RowRoom::default(), <[Vec<f32>; 3]>::default());
+    let mut rgba8 = vec![0; width * planes.height as usize * 4];
+    for (y, out) in rgba8.chunks_exact_mut(width * 4).enumerate() {
+        rows.row(y, &mut room, &mut detail);
+        let target_row = std::array::from_fn(|c| planes.row(c, y));
+        let row = SolveRow { target: target_row, detail: &detail, kind: target.kind, options, out };
+        pulp::Arch::new().dispatch(row);
+    }
+    Ok(rgba8)
+}
+
+fn solve_level(
+    target: &Target,
+    layers: &[Layer],
+    options: &DetailOptions,
+    level: usize,
+    compensated: bool,
+    progress: &(impl Fn(u64) + Sync),
+) -> Result<(Vec<u8>, LevelError), Error> {
+    let planes = &target.levels[level];
+    let (width, height) = (planes.width, planes.height);
+    let decoded = DetailRows::new(layers, target.kind, (width, height), Seen::Decoded);
+    let authored =
+        (!compensated).then(|| DetailRows::new(layers, target.kind, (width, height), Seen::Authored));
+    let bands: Vec<Result<(Vec<u8>, Sums), Error>> = (0..height as usize)
+        .into_par_iter()
+        .step_by(BAND)
+        .map_init(RowRoom::default, |room, y0| {
+            let rows = BAND.min(height as usize - y0);
+            let mut band = Band { planes, target, options, y0, rows, sums: Sums::default() };
+            let result = band.solve(&decoded, authored.as_ref(), room);
+            progress(u64::from(width) * rows as u64);
+            result
+        })
+        .collect();
+    let (mut data, mut sums) = (Vec::new(), Sums::default());
+    for band in bands {
+        let (bytes, band_sums) = band?;
+        data.extend(bytes);
+        sums.add(&band_sums);
+    }
+    Ok((data, LevelError { width, height, error: sums.error(target), unreached: sums.unreached() }))
+}
+
+/// Some whole rows of blocks of one level.
+struct Band<'a> {
+    planes: &'a Planes,
+    target: &'a Target,
+    options: &'a DetailOptions,
+    y0: usize,
+    rows: usize,
+    sums: Sums,
+}
+
+impl Band<'_> {
+    fn solve(
+        &mut self,
+        decoded: &DetailRows,
+        authored: Option<&DetailRows>,
+        room: &mut RowRoom,
+    ) -> Result<(Vec<u8>, Sums), Error> {
+        let width = self.planes.width as usize;
+        let mut seen: Vec<[Vec<f32>; 3]> = vec![<[Vec<f32>; 3]>::default(); self.rows];
+        let mut before = if authored.is_some() { seen.clone() } else { Vec::new() };
+        let mut rgba8 = vec![0; self.rows * width * 4];
+        for (i, out) in rgba8.chunks_exact_mut(width * 4).enumerate() {
+            let y = self.y0 + i;
+            decoded.row(y, room, &mut seen[i]);
+            if let Some(authored) = authored {
+                authored.row(y, room, &mut before[i]);
+            }
+            let against = if authored.is_some() { &before[i] } else { &seen[i] };
+            self.solve_row(std::array::from_fn(|c| self.planes.row(c, y)), against, out);
+        }
+        let mut blocks = encode(self.options.encoding, &rgba8, width as u32, self.rows as u32)?;
+        if self.options.choose && can_choose(self.options.encoding.format, self.target.kind) {
+            let rows = self.y0..self.y0 + self.rows;
+            pulp::Arch::new().dispatch(ChooseBand {
+                width,
+                target: rows.map(|y| std::array::from_fn(|c| self.planes.row(c, y))).collect(),
+                detail: if authored.is_some() { &before } else { &seen },
+                kind: self.target.kind,
+                blend: self.options.blend,
+                blocks: &mut blocks,
+            });
+        }
+        self.measure(&blocks, &seen)?;
+        Ok((blocks, self.sums))
+    }
+
+    fn solve_row(&mut self, target: [&[f32]; 4], detail: &[Vec<f32>; 3], out: &mut [u8]) {
+        let row = SolveRow { target, detail, kind: self.target.kind, options: self.options, out };
+        self.sums.unreached += pulp::Arch::new().dispatch(row);
+    }
+
+    /// Decodes the band again and compares the blended result with the target.
+    fn measure(&mut self, blocks: &[u8], detail: &[[Vec<f32>; 3]]) -> Result<(), Error> {
+        let width = self.planes.width as usize;
+        let texels = decode(self.options.encoding.format, blocks, width as u32, self.rows as u32)?;
+        for (i, detail) in detail.iter().enumerate() {
+            let y = self.y0 + i;
+            for x in 0..width {
+                let d = vec3(detail[0][x], detail[1][x], detail[2][x]);
+                let [r, g, b, _] = texels[i * width + x];
+                let blended = blend(vec3(r, g, b), d, self.target.kind, self.options);
+                let t = Vec3::from(std::array::from_fn(|c| self.planes.row(c, y)[x]));
+                self.sums.sum += squared_error(blended, t, self.target);
+            }
+        }
+        self.sums.texels += (width * self.rows) as u64;
+        Ok(())
+    }
+}
+
+/// A texel of `s` as the sampler returns it, blended with a detail.
+#[inline(always)]
+pub(crate) fn blend(texel: Vec3, d: Vec3, kind: MapKind, options: &DetailOptions) -> Vec3 {
+    match kind {
+        MapKind::Color | MapKind::Data => {
+            let s = detail_from_texel(texel);
+            match options.blend {
+                Blend::Smooth => smooth_overlay_color(s, d),
+                Blend::Plain => overlay_color(s, d),
+            }
+        }
+        MapKind::Normal => {
+            let s = detail_from_texel(texel) * 2.0 - 1.0;
+            rnm(normal_from_xy(s.x, s.y), d)
+        }
+        MapKind::Aniso => detail_over(texel, d, options.aniso_alpha),
+    }
+}
+
+/// Squared difference of two texels in the unit of [`LevelError::error`], summed over the channels measured.
+pub(crate) fn squared_error(a: Vec3, b: Vec3, target: &Target) -> f64 {
+    match target.kind {
+        MapKind::Normal => {
+            let b = normal_from_xy(b.x, b.y);
+            let angle = libm::atan2f(a.cross(b).length(), a.dot(b)).to_degrees();
+            f64::from(angle * angle)
+        }
+        kind => {
+            let code = |v: f32| if kind == MapKind::Color { code_from_linear(v) } else { v };
+            (0..target.measured())
+                .map(|c| {
+                    let difference = (code(a[c]) - code(b[c])) * 255.0;
+                    f64::from(difference * difference)
+                })
+                .sum()
+        }
+    }
+}
+
+/// Sums over texels.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Sums {
+    pub(crate) texels: u64,
+    pub(crate) sum: f64,
+    pub(crate) unreached: u64,
+}
+
+impl Sums {
+    pub(crate) fn add(&mut self, o: &Sums) {
+        self.texels += o.texels;
+        self.sum += o.sum;
+        self.unreached += o.unreached;
+    }
+
+    pub(crate) fn error(&self, target: &Target) -> f32 {
+        let numbers = if target.kind == MapKind::Normal { 1 } else { target.measured() };
+        (self.sum / (self.texels as f64 * numbers as f64)).sqrt() as f32
+    }
+
+    fn unreached(&self) -> f32 {
+        self.unreached as f32 / self.texels as f32
+    }
+}
+
+/// One row, as a unit that is compiled once for each instruction set. Returns how many texels cannot be reached.
+struct SolveRow<'a> {
+    target: [&'a [f32]; 4],
+    detail: &'a [Vec<f32>; 3],
+    kind: MapKind,
+    options: &'a DetailOptions,
+    out: &'a mut [u8],
+}
+
+impl pulp::WithSimd for SolveRow<'_> {
+    type Output = u64;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> u64 {
+        let SolveRow { target, detail, kind, options, out } = self;
+        match kind {
+            MapKind::Color | MapKind::Data => {
+                match options.blend {
+                    Blend::Smooth => overlay_rows(target, detail, Smooth, out),
+                    Blend::Plain => overlay_rows(target, detail, Plain, out),
+                }
+                0
+            }
+            MapKind::Normal => {
+                let mut unreached = 0;
+                for (x, out) in out.chunks_exact_mut(4).enumerate() {
+                    let t = normal_from_xy(target[0][x], target[1][x]);
+                    let s = rnm_inverse(t, vec3(detail[0][x], detail[1][x], detail[2][x]));
+                    unreached += u64::from(s.z == 0.0);
+                    let byte = |v: f32| synthesized_byte(v * 0.5 + 0.5);
+                    out.copy_from_slice(&[byte(s.x), byte(s.y), byte(s.z), 255]);
+                }
+                unreached
+            }
+            MapKind::Aniso => {
+                let mut unreached = 0;
+                for (x, out) in out.chunks_exact_mut(4).enumerate() {
+                    let t = vec3(target[0][x], target[1][x], target[2][x]);
+                    let d = vec3(detail[0][x], detail[1][x], detail[2][x]);
+                    let s = detail_over_inverse(t, d, options.aniso_alpha);
+                    let missed = detail_over(s, d, options.aniso_alpha) - t;
+                    // Half a step of 8 bits is lost anyway.
+                    unreached += u64::from(missed.abs().max_element() > 0.5 / 255.0);
+                    let byte = |v: f32| (v * 255.0 + 0.5) as u8;
+                    out.copy_from_slice(&[byte(s.x), byte(s.y), byte(s.z), 255]);
+                }
+                unreached
+            }
+        }
+    }
+}
+
+/// The byte that [`detail_from_texel`] turns into a value in [0, 1].
+#[inline(always)]
+fn synthesized_byte(s: f32) -> u8 {
+    (s * 254.0 + 1.5) as u8
+}
+
+/// Texels solved at a time: loops of known length are what compilers vectorise.
+const RUN: usize = 64;
+
+#[inline(always)]
+fn overlay_rows(target: [&[f32]; 4], detail: &[Vec<f32>; 3], operator: impl Operator, out: &mut [u8]) {
+    let mut values = [[0.0_f32; RUN]; 4];
+    let width = target[0].len();
+    for (x0, out) in (0..width).step_by(RUN).zip(out.chunks_mut(RUN * 4)) {
+        let len = RUN.min(width - x0);
+        for channel in 0..3 {
+            let (mut t, mut d) = ([0.0; RUN], [0.0; RUN]);
+            t[..len].copy_from_slice(&target[channel][x0..x0 + len]);
+            d[..len].copy_from_slice(&detail[channel][x0..x0 + len]);
+            for i in 0..RUN {
+                values[channel][i] = operator.inverse(t[i], d[i]) * 254.0 + 1.5;
+            }
+        }
+        for (value, alpha) in values[3].iter_mut().zip(&target[3][x0..x0 + len]) {
+            *value = alpha * 255.0 + 0.5;
+        }
+        for (i, out) in out.chunks_exact_mut(4).enumerate() {
+            for (channel, out) in out.iter_mut().enumerate() {
+                *out = values[channel][i] as u8;
+            }
+        }
+    }
+}
