@@ -246,6 +246,16 @@ pub enum PresetName {
     Best,
 }
 
+impl From<PresetName> for Preset {
+    fn from(name: PresetName) -> Self {
+        match name {
+            PresetName::Fast => Preset::Fast,
+            PresetName::Normal => Preset::Normal,
+            PresetName::Best => Preset::Best,
+        }
+    }
+}
+
 impl Args {
     /// A map's encoding: the role's measured default, changed by what flags say.
     fn encoding(&self, role: Role, format: Option<FormatName>) -> Encoding {
@@ -267,11 +277,7 @@ impl Args {
             };
         }
         if let Some(preset) = self.preset {
-            encoding.preset = match preset {
-                PresetName::Fast => Preset::Fast,
-                PresetName::Normal => Preset::Normal,
-                PresetName::Best => Preset::Best,
-            };
+            encoding.preset = preset.into();
         }
         encoding
     }

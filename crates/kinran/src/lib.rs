@@ -8,6 +8,7 @@ pub mod compare;
 mod compare_sheet;
 mod console;
 pub mod demo;
+pub mod detail;
 mod error;
 pub mod inspect;
 mod outputs;

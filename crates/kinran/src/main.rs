@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 #[cfg(feature = "view")]
 use kinran::viewer;
-use kinran::{Console, Error, bake, compare, demo, inspect, render, shaders};
+use kinran::{Console, Error, bake, compare, demo, detail, inspect, render, shaders};
 
 /// Anisotropic materials from authored maps to pictures.
 #[derive(Parser)]
@@ -15,6 +15,7 @@ use kinran::{Console, Error, bake, compare, demo, inspect, render, shaders};
   kinran bake model.glb -o baked/
   kinran render model.glb -o model.png
   kinran compare model.glb -o comparison/
+  kinran detail solve helmet.png --layer steel.png,scale=4 -o baked/
   kinran inspect model_normal.ktx2
   kinran shaders --lang hlsl -o shaders/
 
@@ -43,6 +44,7 @@ enum Command {
     Bake(bake::Args),
     Render(render::Args),
     Compare(compare::Args),
+    Detail(detail::Args),
     Inspect(inspect::Args),
     Shaders(shaders::Args),
     #[cfg(feature = "view")]
@@ -67,6 +69,7 @@ fn run(command: &Command, console: &Console) -> Result<(), Error> {
         Command::Bake(args) => bake::run(args, console),
         Command::Render(args) => render::run(args, console),
         Command::Compare(args) => compare::run(args, console),
+        Command::Detail(args) => detail::run(args, console),
         Command::Inspect(args) => inspect::run(args, console),
         #[cfg(feature = "view")]
         Command::View(args) => viewer::run(args, console),

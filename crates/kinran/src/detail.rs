@@ -1,0 +1,100 @@
+//! `kinran detail`: detail maps, solved by inversion.
+
+mod layer_flag;
+mod library;
+mod page;
+mod solve;
+
+use clap::{Subcommand, ValueEnum};
+use kinran_bake::detail::MapKind;
+use kinran_image::{Encoder, Encoding, Format, Preset};
+
+use crate::{Console, Error};
+
+pub use layer_flag::LayerFlag;
+pub use library::{LibraryArgs, LibraryReport, report_library};
+pub use solve::{SolveArgs, SolveReport, solve_target};
+
+/// Splits a map into tiled layers and a map that turns them into it
+///
+/// `solve` takes a target, as an artist painted it over tiled materials, and those tiles, and writes the synthesized map
+/// that a shader lays over the tiles to get the target back. `report` tries a whole folder of materials: it paints
+/// targets over every one, solves them, and writes the table of errors with pictures.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Solve(Box<SolveArgs>),
+    Report(LibraryArgs),
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever is wrong with the input, the flags or the output folder; nothing half-written stays.
+pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    match &args.command {
+        Command::Solve(args) => solve::run(args, console),
+        Command::Report(args) => library::run(args, console),
+    }
+}
+
+/// What a map holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum KindName {
+    /// sRGB colour
+    #[default]
+    Color,
+    /// Roughness, gloss, specular, occlusion, metallic, or several of them
+    Data,
+    /// Tangent-space normals
+    Normal,
+    /// Aniso texels
+    Aniso,
+}
+
+impl From<KindName> for MapKind {
+    fn from(name: KindName) -> Self {
+        match name {
+            KindName::Color => MapKind::Color,
+            KindName::Data => MapKind::Data,
+            KindName::Normal => MapKind::Normal,
+            KindName::Aniso => MapKind::Aniso,
+        }
+    }
+}
+
+/// Formats of synthesized maps and tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[allow(missing_docs, reason = "the names are the formats'")]
+pub enum BlockFormat {
+    Bc1,
+    Bc4,
+    Bc5,
+    Bc7,
+    Rgba8,
+}
+
+impl BlockFormat {
+    /// The format with the encoder that serves it best in a second a megapixel: ISPC for BC7 where it is built in, else
+    /// the portable one.
+    pub(crate) fn encoding(self) -> Encoding {
+        let (format, encoder, preset) = match self {
+            BlockFormat::Bc1 => (Format::Bc1, Encoder::Portable, Preset::Normal),
+            BlockFormat::Bc4 => (Format::Bc4, Encoder::Portable, Preset::Fast),
+            BlockFormat::Bc5 => (Format::Bc5, Encoder::Portable, Preset::Fast),
+            BlockFormat::Bc7 => return kinran_image::Role::Color.encoding(),
+            BlockFormat::Rgba8 => (Format::Rgba8, Encoder::Portable, Preset::Fast),
+        };
+        Encoding { format, encoder, preset }
+    }
+}
+
+/// The format of a kind of map where nothing is said: BC7, and BC5 for normals.
+pub(crate) fn default_format(kind: MapKind) -> BlockFormat {
+    if kind == MapKind::Normal { BlockFormat::Bc5 } else { BlockFormat::Bc7 }
+}

@@ -1,0 +1,139 @@
+//! A layer as one flag: `steel.png,scale=4,rotation=30,mask=rust.png,channel=g`.
+
+use std::path::PathBuf;
+
+use glam::{Vec2, vec2};
+
+/// What `--layer` says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayerFlag {
+    /// The tile: an image, or a baked .ktx2 or .dds.
+    pub tile: PathBuf,
+    /// Repetitions along u and v.
+    pub scale: Vec2,
+    /// Degrees.
+    pub rotation: f32,
+    /// In tiles.
+    pub offset: Vec2,
+    /// Every other tile is mirrored.
+    pub mirror: bool,
+    /// Hue in degrees.
+    pub hue: f32,
+    /// Factor of saturation.
+    pub saturation: f32,
+    /// Factor of value.
+    pub value: f32,
+    /// Where the layer is seen.
+    pub mask: Option<PathBuf>,
+    /// 0 red to 3 alpha.
+    pub channel: usize,
+    /// Of the mask.
+    pub contrast: f32,
+    /// Green of a normal tile grows downwards.
+    pub y_down: bool,
+}
+
+/// Names that a layer takes, for the message.
+const NAMES: &str =
+    "scale, rotation, offset, mirror, hue, saturation, value, mask, channel, contrast, y-down";
+
+/// `FILE[,NAME=VALUE]...`
+pub(crate) fn layer_flag(text: &str) -> Result<LayerFlag, String> {
+    let mut parts = text.split(',');
+    let tile = parts.next().map(str::trim).filter(|file| !file.is_empty());
+    let Some(tile) = tile else { return Err("write FILE or FILE,scale=4,...".into()) };
+    let mut layer = LayerFlag {
+        tile: tile.into(),
+        scale: Vec2::ONE,
+        rotation: 0.0,
+        offset: Vec2::ZERO,
+        mirror: false,
+        hue: 0.0,
+        saturation: 1.0,
+        value: 1.0,
+        mask: None,
+        channel: 0,
+        contrast: 1.0,
+        y_down: false,
+    };
+    for part in parts {
+        let (name, value) = part.split_once('=').unwrap_or((part, ""));
+        let (name, value) = (name.trim(), value.trim());
+        let number = || {
+            value
+                .parse::<f32>()
+                .ok()
+                .filter(|v| v.is_finite())
+                .ok_or(format!("{name}={value}: write a number"))
+        };
+        let factor = || {
+            number().and_then(|v| if v >= 0.0 { Ok(v) } else { Err(format!("{name} must not be negative")) })
+        };
+        match name {
+            "scale" => layer.scale = pair(name, value)?,
+            "rotation" => layer.rotation = number()?,
+            "offset" => layer.offset = pair(name, value)?,
+            "mirror" if value.is_empty() => layer.mirror = true,
+            "hue" => layer.hue = number()?,
+            "saturation" => layer.saturation = factor()?,
+            "value" => layer.value = factor()?,
+            "mask" if !value.is_empty() => layer.mask = Some(value.into()),
+            "channel" => {
+                layer.channel = ["r", "g", "b", "a"]
+                    .iter()
+                    .position(|c| *c == value)
+                    .ok_or(format!("channel={value}: choose r, g, b or a"))?;
+            }
+            "contrast" => layer.contrast = factor()?,
+            "y-down" if value.is_empty() => layer.y_down = true,
+            _ => return Err(format!("a layer knows no {part}; it takes {NAMES}")),
+        }
+    }
+    if layer.scale.x == 0.0 || layer.scale.y == 0.0 {
+        return Err("scale must not be zero".into());
+    }
+    Ok(layer)
+}
+
+/// `4` or `4x2`.
+fn pair(name: &str, value: &str) -> Result<Vec2, String> {
+    let (x, y) = value.split_once(['x', 'X', '×']).unwrap_or((value, value));
+    match (x.trim().parse::<f32>(), y.trim().parse::<f32>()) {
+        (Ok(x), Ok(y)) if x.is_finite() && y.is_finite() => Ok(vec2(x, y)),
+        _ => Err(format!("{name}={value}: write one number, or two as 4x2")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn layers_are_read_as_they_are_written() {
+        let layer = layer_flag(
+            "a/steel.png, scale=4x-2,rotation=30,offset=0.5,mirror,mask=m.png,channel=g,contrast=2",
+        )
+        .unwrap();
+        assert_eq!(layer.tile, PathBuf::from("a/steel.png"));
+        assert_eq!((layer.scale, layer.offset, layer.rotation), (vec2(4.0, -2.0), Vec2::splat(0.5), 30.0));
+        assert_eq!((layer.mirror, layer.channel, layer.contrast), (true, 1, 2.0));
+        assert_eq!(layer.mask, Some("m.png".into()));
+    }
+
+    #[test]
+    fn layers_that_mean_nothing_are_refused() {
+        for bad in [
+            "",
+            ",scale=2",
+            "a,scale=0",
+            "a,scale=x",
+            "a,sclae=2",
+            "a,channel=x",
+            "a,mask=",
+            "a,hue=nan",
+            "a,value=-1",
+        ] {
+            assert!(layer_flag(bad).is_err(), "{bad:?} became {:?}", layer_flag(bad));
+        }
+    }
+}

@@ -1,0 +1,449 @@
+//! `kinran detail report`: a whole library of materials, in the manner of the talk's table.
+
+use std::path::{Path, PathBuf};
+
+use glam::Vec2;
+use kinran_bake::detail::{
+    Comparison, DetailOptions, Layer, LayerTransform, MapKind, Mask, Paint, PaintGuides, Target, Tile,
+    TileOptions, compare, level_pictures,
+};
+use kinran_bake::folder::{Green, Role, named_maps};
+use kinran_image::{Channels, Encoding, Image, Pixels, encode_png, read_image, write_atomically};
+use serde::Serialize;
+
+use super::{BlockFormat, KindName, page};
+use crate::outputs::check_folder;
+use crate::table::table;
+use crate::{Console, Error};
+
+/// Paints a target over every material of a folder, solves each and reports the errors: report.json and index.html
+///
+/// FOLDER holds a folder for each material, with maps named as exporters name them. Every target is painted (grime by
+/// occlusion and in cavities, rubbed edges, large-scale colour) over its material and a second one in patches, tiled at
+/// twice the target's density, and solved twice: "own" against the tiles it was painted over, as in the talk, and "other"
+/// against the one tile of all other materials that is nearest in its colours. Numbers are those of the second mip, as in
+/// the talk, and of the first.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  kinran detail report materials/ -o report/
+  kinran detail report materials/ -o report/ --format bc1 --kind color --size 512")]
+pub struct LibraryArgs {
+    /// A folder of folders of maps
+    #[arg(value_name = "FOLDER")]
+    pub folder: PathBuf,
+
+    /// Where the report goes; made if it is not there
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+
+    /// Formats of colour, data and aniso maps; may be given again [default: bc1 and bc7]. Normals are BC5
+    #[arg(long, value_enum)]
+    pub format: Vec<BlockFormat>,
+
+    /// Kinds of maps; may be given again [default: all that are there]
+    #[arg(long, value_enum)]
+    pub kind: Vec<KindName>,
+
+    /// Side of the targets in texels
+    #[arg(long, value_name = "TEXELS", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(16..=8192))]
+    pub size: u32,
+
+    /// Centre the histograms of the tiles
+    #[arg(long)]
+    pub center: bool,
+
+    /// No pictures, numbers only
+    #[arg(long)]
+    pub no_pictures: bool,
+}
+
+/// A map of a material.
+#[derive(Clone, Debug)]
+struct MapFile {
+    role: Role,
+    kind: MapKind,
+    y_down: bool,
+    image: Image,
+}
+
+struct Material {
+    name: String,
+    maps: Vec<MapFile>,
+}
+
+impl Material {
+    fn map(&self, role: Role) -> Option<&MapFile> {
+        self.maps.iter().find(|map| map.role == role)
+    }
+}
+
+/// One target solved in one way.
+#[derive(Clone, Debug, Serialize)]
+pub struct LibraryRow {
+    /// The material that the target was painted over.
+    pub material: String,
+    /// Which of its maps.
+    pub map: String,
+    /// Format of the synthesized map and its tiles.
+    pub format: String,
+    /// The materials whose tiles it was solved against.
+    pub tiles: Vec<String>,
+    /// Whether these are the tiles it was painted over.
+    pub own: bool,
+    /// The numbers.
+    pub comparison: Comparison,
+}
+
+/// Means of one kind of rows at one level.
+#[derive(Clone, Debug, Serialize)]
+pub struct LibraryMean {
+    /// Which maps.
+    pub map: String,
+    /// Their format.
+    pub format: String,
+    /// Solved against the tiles painted over.
+    pub own: bool,
+    /// 0 the finest.
+    pub level: usize,
+    /// How many.
+    pub count: usize,
+    /// Mean error of the compressed targets.
+    pub target: f32,
+    /// With everything.
+    pub blended: f32,
+    /// By the talk's method.
+    pub talk: f32,
+    /// The talk's with plain overlay.
+    pub plain_overlay: f32,
+    /// The talk's without compensation.
+    pub uncompensated: f32,
+    /// How many of the blended are no worse than the compressed target.
+    pub no_worse: usize,
+}
+
+/// The whole report.
+#[derive(Clone, Debug, Serialize)]
+pub struct LibraryReport {
+    /// Side of the targets.
+    pub size: u32,
+    /// Means, in the manner of the talk's table.
+    pub means: Vec<LibraryMean>,
+    /// Every target.
+    pub rows: Vec<LibraryRow>,
+}
+
+pub(super) fn run(args: &LibraryArgs, console: &Console) -> Result<(), Error> {
+    check_folder(&args.output)?;
+    let report = report_library(args, console)?;
+    console.result(&report, &text(&report))
+}
+
+/// Paints, solves, measures and writes the report.
+///
+/// # Errors
+/// The folder has no materials with maps of the kinds asked for, a map cannot be read, or the output cannot be written.
+pub fn report_library(args: &LibraryArgs, console: &Console) -> Result<LibraryReport, Error> {
+    let materials = read_materials(args)?;
+    let formats =
+        if args.format.is_empty() { vec![BlockFormat::Bc1, BlockFormat::Bc7] } else { args.format.clone() };
+    let pictures = args.output.join("pictures");
+    if !args.no_pictures {
+        std::fs::create_dir_all(&pictures).map_err(|e| kinran_image::Error::io(&pictures, e))?;
+    }
+    let total: usize =
+        materials.iter().map(|m| m.maps.iter().filter(|map| map.role != Role::Height).count()).sum();
+    let stage = console.progress().stage("painting and solving", total as u64);
+    let mut report = LibraryReport { size: args.size, means: Vec::new(), rows: Vec::new() };
+    for (i, material) in materials.iter().enumerate() {
+        for map in material.maps.iter().filter(|map| map.role != Role::Height) {
+            let formats = if map.kind == MapKind::Normal { &[BlockFormat::Bc5][..] } else { &formats };
+            for (n, format) in formats.iter().enumerate() {
+                let shown = (!args.no_pictures && n == 0).then_some(pictures.as_path());
+                report.rows.extend(solve_map(args, &materials, i, map, *format, shown)?);
+            }
+            stage.add(1);
+        }
+    }
+    drop(stage);
+    report.means = means(&report.rows);
+    let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
+    write_atomically(&args.output.join("report.json"), &json)?;
+    write_atomically(&args.output.join("index.html"), page::page(&report, !args.no_pictures).as_bytes())?;
+    Ok(report)
+}
+
+/// Paints one target and solves it against its own tiles and against another's.
+fn solve_map(
+    args: &LibraryArgs,
+    materials: &[Material],
+    index: usize,
+    map: &MapFile,
+    format: BlockFormat,
+    pictures: Option<&Path>,
+) -> Result<Vec<LibraryRow>, Error> {
+    let material = &materials[index];
+    let encoding = format.encoding();
+    let tile_of = |map: &MapFile, encoding: Encoding, center: bool| {
+        let options = TileOptions { y_down: map.y_down, center, ..TileOptions::new(map.kind, encoding) };
+        Tile::new(&map.image, options)
+    };
+    let others: Vec<usize> = (1..materials.len())
+        .map(|step| (index + step) % materials.len())
+        .filter(|&i| materials[i].map(map.role).is_some())
+        .collect();
+
+    // Paint over the material, and over another in patches.
+    let rgba8 = BlockFormat::Rgba8.encoding();
+    let guide = |role: Role| {
+        material
+            .map(role)
+            .map(|map| tile_of(&MapFile { kind: MapKind::Data, ..map.clone() }, rgba8, false))
+            .transpose()
+    };
+    let (height, occlusion) = (guide(Role::Height)?, guide(Role::Occlusion)?);
+    let base = tile_of(map, encoding, args.center)?;
+    let second = others
+        .get(others.len() / 3)
+        .map(|&i| tile_of(materials[i].map(map.role).expect("it was looked for"), encoding, args.center))
+        .transpose()?;
+    let seed = index as u32 * 97 + 13;
+    let mask = Tile::new(
+        &patches(args.size / 2, seed)?,
+        TileOptions::new(MapKind::Data, BlockFormat::Bc4.encoding()),
+    )?;
+    let mut own = vec![layer_of(&base, args.size)];
+    if let Some(second) = &second {
+        own.push(Layer {
+            mask: Some(Mask { map: &mask, channel: 0, contrast: 2.0 }),
+            ..layer_of(second, args.size)
+        });
+    }
+    let guides = PaintGuides { height: height.as_ref(), occlusion: occlusion.as_ref() };
+    let paint = Paint::new(guides, &layer_of(&base, args.size), (args.size, args.size), seed)?;
+    // Paint goes over what was scanned; only the solver sees centred tiles.
+    let plain = [
+        tile_of(map, rgba8, false)?,
+        match others.get(others.len() / 3) {
+            Some(&i) => tile_of(materials[i].map(map.role).expect("it was looked for"), rgba8, false)?,
+            None => tile_of(map, rgba8, false)?,
+        },
+    ];
+    let under: Vec<Layer> = own.iter().zip(&plain).map(|(layer, tile)| Layer { tile, ..*layer }).collect();
+    let image = paint.target(&under, map.kind)?;
+    let target = Target::new(&image, map.kind, false)?;
+
+    let options = DetailOptions::new(encoding);
+    let mut rows = Vec::new();
+    let mut solve = |layers: &[Layer], tiles: Vec<String>, own: bool| -> Result<(), Error> {
+        let (comparison, solved) = compare(&target, layers, &options, &|_| {})?;
+        if let Some(folder) = pictures {
+            let shown = level_pictures(&target, layers, &options, &solved, 1)?;
+            let side = 256.min(args.size / 2);
+            for (name, picture) in page::PICTURES.into_iter().zip([
+                &shown.detail,
+                &shown.synthesized,
+                &shown.blended,
+                &shown.target,
+                &shown.error,
+                &shown.target_error,
+            ]) {
+                let which = if own { "own" } else { "other" };
+                let file = page::picture_file(&material.name, map.role.name(), which, name);
+                write_atomically(&folder.join(file), &encode_png(&crop(picture, side)?)?)?;
+            }
+        }
+        rows.push(LibraryRow {
+            material: material.name.clone(),
+            map: map.role.name().into(),
+            format: format!("{:?}", encoding.format).to_uppercase(),
+            tiles,
+            own,
+            comparison,
+        });
+        Ok(())
+    };
+    let second_name = others.get(others.len() / 3).map(|&i| materials[i].name.clone());
+    solve(&own, std::iter::once(material.name.clone()).chain(second_name).collect(), true)?;
+    let near = others.iter().copied().min_by(|&a, &b| {
+        let distance =
+            |i: usize| distance(&image, &materials[i].map(map.role).expect("it was looked for").image);
+        distance(a).total_cmp(&distance(b))
+    });
+    if let Some(near) = near {
+        let tile = tile_of(materials[near].map(map.role).expect("it was looked for"), encoding, args.center)?;
+        solve(&[layer_of(&tile, args.size)], vec![materials[near].name.clone()], false)?;
+    }
+    Ok(rows)
+}
+
+/// A tile at twice the target's density.
+fn layer_of(tile: &Tile, size: u32) -> Layer<'_> {
+    let (width, height) = tile.size();
+    let repeats = |side: u32| (2.0 * size as f32 / side as f32).round().max(1.0);
+    let scale = Vec2::new(repeats(width), repeats(height));
+    Layer { transform: LayerTransform { scale, ..LayerTransform::default() }, ..Layer::new(tile) }
+}
+
+/// A mask of soft patches.
+fn patches(side: u32, seed: u32) -> Result<Image, Error> {
+    let bytes = (0..side * side)
+        .map(|i| {
+            let (x, y) = ((i % side) as f32 / side as f32, (i / side) as f32 / side as f32);
+            let phase = seed as f32;
+            let wave = libm::sinf(7.0 * x + 3.0 * libm::sinf(5.0 * y + phase) + phase)
+                + libm::sinf(6.0 * y + 2.0 * libm::sinf(9.0 * x - phase));
+            ((0.35 + 0.35 * wave).clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+        })
+        .collect();
+    Ok(Image::new(side, side, Channels::R, Pixels::U8(bytes))?)
+}
+
+/// How far two images are apart in the mean and the spread of their samples.
+fn distance(a: &Image, b: &Image) -> f64 {
+    let [a, b] = [a, b].map(moments);
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+}
+
+/// Mean and standard deviation of red, green and blue, over every eighth texel of every eighth row.
+fn moments(image: &Image) -> [f64; 6] {
+    let (mut sums, mut squares, mut count) = ([0.0; 3], [0.0; 3], 0.0);
+    for y in (0..image.height).step_by(8) {
+        for x in (0..image.width).step_by(8) {
+            let texel = image.texel(x, y);
+            for c in 0..3 {
+                sums[c] += f64::from(texel[c]);
+                squares[c] += f64::from(texel[c]) * f64::from(texel[c]);
+            }
+            count += 1.0;
+        }
+    }
+    std::array::from_fn(|i| {
+        let mean = sums[i % 3] / count;
+        if i < 3 { mean } else { (squares[i % 3] / count - mean * mean).max(0.0).sqrt() }
+    })
+}
+
+/// The middle of a picture.
+fn crop(image: &Image, side: u32) -> Result<Image, Error> {
+    let Pixels::U8(bytes) = &image.pixels else { return Ok(image.clone()) };
+    let (w, h) = (side.min(image.width), side.min(image.height));
+    let (x0, y0) = ((image.width - w) / 2, (image.height - h) / 2);
+    let n = image.channels.count();
+    let rows = (y0..y0 + h).flat_map(|y| {
+        let start = (y as usize * image.width as usize + x0 as usize) * n;
+        bytes[start..start + w as usize * n].iter().copied()
+    });
+    Ok(Image::new(w, h, image.channels, Pixels::U8(rows.collect()))?)
+}
+
+fn read_materials(args: &LibraryArgs) -> Result<Vec<Material>, Error> {
+    let io = |e| kinran_image::Error::io(&args.folder, e);
+    let mut folders: Vec<PathBuf> = std::fs::read_dir(&args.folder)
+        .map_err(io)?
+        .map(|entry| entry.map(|entry| entry.path()).map_err(io))
+        .collect::<Result<_, _>>()?;
+    folders.retain(|folder| folder.is_dir());
+    folders.sort();
+    let wanted =
+        |kind: MapKind| args.kind.is_empty() || args.kind.iter().any(|&name| MapKind::from(name) == kind);
+    let mut materials = Vec::new();
+    for folder in folders {
+        let mut maps: Vec<MapFile> = Vec::new();
+        for (file, role, green) in named_maps(&folder)? {
+            let kind = match role {
+                Role::Color => MapKind::Color,
+                Role::Normal => MapKind::Normal,
+                Role::Roughness | Role::Gloss | Role::Occlusion | Role::Metallic | Role::Specular => {
+                    MapKind::Data
+                }
+                Role::Aniso => MapKind::Aniso,
+                Role::Height => MapKind::Data,
+                _ => continue,
+            };
+            let guide = matches!(role, Role::Height | Role::Occlusion);
+            if maps.iter().any(|map| map.role == role) || !(guide || wanted(kind)) {
+                continue;
+            }
+            let y_down = green == Some(Green::Down);
+            maps.push(MapFile { role, kind, y_down, image: read_image(&file)? });
+        }
+        let is_target = |map: &MapFile| map.role != Role::Height && wanted(map.kind);
+        if maps.iter().any(is_target) {
+            let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            materials.push(Material { name, maps });
+        }
+    }
+    if materials.is_empty() {
+        return Err(Error::Usage(format!(
+            "{}: there is no folder with maps in it; give a folder of folders with maps named as color, normal, \
+             roughness, ao or metallic",
+            args.folder.display()
+        )));
+    }
+    Ok(materials)
+}
+
+fn means(rows: &[LibraryRow]) -> Vec<LibraryMean> {
+    let mut groups: std::collections::BTreeMap<(String, String, bool, usize), Vec<&LibraryRow>> =
+        Default::default();
+    for row in rows {
+        for level in [1, 0] {
+            if row.comparison.levels.len() > level {
+                groups
+                    .entry((row.map.clone(), row.format.clone(), !row.own, 1 - level))
+                    .or_default()
+                    .push(row);
+            }
+        }
+    }
+    groups
+        .into_iter()
+        .map(|((map, format, other, level), rows)| {
+            let level = 1 - level;
+            let mean = |of: &dyn Fn(&kinran_bake::detail::LevelComparison) -> f32| {
+                rows.iter().map(|row| of(&row.comparison.levels[level])).sum::<f32>() / rows.len() as f32
+            };
+            let no_worse = rows.iter().filter(|row| {
+                let errors = &row.comparison.levels[level];
+                errors.blended <= errors.target
+            });
+            LibraryMean {
+                map,
+                format,
+                own: !other,
+                level,
+                count: rows.len(),
+                target: mean(&|e| e.target),
+                blended: mean(&|e| e.blended),
+                talk: mean(&|e| e.talk),
+                plain_overlay: mean(&|e| e.plain_overlay),
+                uncompensated: mean(&|e| e.uncompensated),
+                no_worse: no_worse.count(),
+            }
+        })
+        .collect()
+}
+
+fn text(report: &LibraryReport) -> String {
+    let mut rows = vec![
+        [
+            "map",
+            "format",
+            "tiles",
+            "mip",
+            "count",
+            "target",
+            "blended",
+            "talk",
+            "plain overlay",
+            "uncompensated",
+            "no worse",
+        ]
+        .map(String::from)
+        .to_vec(),
+    ];
+    for mean in &report.means {
+        rows.push(page::cells(mean).to_vec());
+    }
+    table(&rows)
+}

@@ -1,0 +1,145 @@
+//! The library's report as a page.
+
+use super::library::{LibraryMean, LibraryReport, LibraryRow};
+
+/// Pictures of a target, in order.
+pub(super) const PICTURES: [&str; 6] =
+    ["detail", "synthesized", "blended", "target", "error", "target-error"];
+
+/// File name of a picture.
+pub(super) fn picture_file(material: &str, map: &str, which: &str, picture: &str) -> String {
+    format!("{material}_{map}_{which}_{picture}.png")
+}
+
+/// Colours and lengths are chosen by eye.
+const STYLE: &str = "
+:root { color-scheme: dark; --paper: #15161a; --ink: #e9e7e1; --faint: #9a9aa2; --gold: #d9b46a; --line: #2b2d34; }
+body { margin: 0; background: var(--paper); color: var(--ink); font: 16px/1.5 Georgia, 'Times New Roman', serif; }
+main { max-width: 1280px; margin: 0 auto; padding: 3rem 1.5rem 5rem; }
+h1 { font-weight: normal; } h2 { font-weight: normal; color: var(--gold); margin: 3rem 0 .3rem; }
+p { max-width: 48rem; color: var(--faint); }
+table { border-collapse: collapse; font: 14px/1.5 ui-monospace, 'DejaVu Sans Mono', monospace; }
+th, td { text-align: right; padding: .25rem .8rem; border-bottom: 1px solid var(--line); font-weight: normal; }
+th { color: var(--faint); } .good { color: #7ed38a; } .bad { color: #e08a7a; }
+.maps { display: grid; grid-template-columns: repeat(6, 1fr); gap: .6rem; margin: .6rem 0; }
+figure { margin: 0; } figcaption { color: var(--faint); font-size: .8rem; } img { width: 100%; display: block; }
+";
+
+/// A mean as a row of cells.
+pub(super) fn cells(mean: &LibraryMean) -> [String; 11] {
+    [
+        mean.map.clone(),
+        mean.format.clone(),
+        if mean.own { "own".into() } else { "other".into() },
+        mean.level.to_string(),
+        mean.count.to_string(),
+        format!("{:.3}", mean.target),
+        format!("{:.3} ({:+.1} %)", mean.blended, 100.0 * (mean.blended / mean.target - 1.0)),
+        format!("{:.3}", mean.talk),
+        format!("{:.3}", mean.plain_overlay),
+        format!("{:.3}", mean.uncompensated),
+        format!("{} of {}", mean.no_worse, mean.count),
+    ]
+}
+
+/// HTML with the means, and for each target its numbers and pictures.
+pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
+    let head = [
+        "map",
+        "format",
+        "tiles",
+        "mip",
+        "count",
+        "target alone",
+        "blended",
+        "the talk's",
+        "plain overlay",
+        "uncompensated",
+        "no worse",
+    ];
+    let head: String = head.iter().map(|name| format!("<th>{name}")).collect();
+    let means: String = report
+        .means
+        .iter()
+        .map(|mean| {
+            let class = if mean.blended <= mean.target { "good" } else { "bad" };
+            let cells: String = cells(mean)
+                .iter()
+                .enumerate()
+                .map(
+                    |(i, cell)| {
+                        if i == 6 { format!("<td class=\"{class}\">{cell}") } else { format!("<td>{cell}") }
+                    },
+                )
+                .collect();
+            format!("<tr>{cells}\n")
+        })
+        .collect();
+    let mut shown: Vec<(&str, &str)> = Vec::new();
+    let sections: String = report
+        .rows
+        .iter()
+        .map(|row| {
+            let first = !shown.contains(&(&row.material, &row.map));
+            if first {
+                shown.push((&row.material, &row.map));
+            }
+            section(row, first, pictures)
+        })
+        .collect();
+    let size = report.size;
+    format!(
+        "<!doctype html>
+<html lang=\"en\">
+<meta charset=\"utf-8\">
+<meta name=\"viewport\" content=\"width=device-width\">
+<title>Kinran: detail maps</title>
+<style>{STYLE}</style>
+<main>
+<h1>Detail maps</h1>
+<p>Targets of {size} x {size} texels, painted over tiled materials and solved. Errors are root mean squares in steps of 8
+bits, for normals in degrees, of the second mip and of the first. \"own\": against the tiles the target was painted over;
+\"other\": against the nearest tile of another material. Error pictures are 8 times enlarged.</p>
+<table>
+<tr>{head}
+{means}</table>
+{sections}</main>
+</html>
+"
+    )
+}
+
+fn section(row: &LibraryRow, first: bool, pictures: bool) -> String {
+    let which = if row.own { "own" } else { "other" };
+    let heading = if first { format!("<h2>{}, {}</h2>\n", row.material, row.map) } else { String::new() };
+    let errors = row.comparison.levels.get(1).unwrap_or(&row.comparison.levels[0]);
+    let saved = 100.0 * (1.0 - row.comparison.synthesized_bytes as f64 / row.comparison.unique_bytes as f64);
+    let words = format!(
+        "<p>{}, {which} tiles ({}): target alone {:.3}, blended {:.3}, the talk's {:.3}, plain overlay {:.3}, uncompensated \
+         {:.3}. Synthesized {} bytes + shared {}; a unique map as fine as the tiles {} ({saved:.0} % saved beside the \
+         shared).</p>\n",
+        row.format,
+        row.tiles.join(", "),
+        errors.target,
+        errors.blended,
+        errors.talk,
+        errors.plain_overlay,
+        errors.uncompensated,
+        row.comparison.synthesized_bytes,
+        row.comparison.shared_bytes,
+        row.comparison.unique_bytes,
+    );
+    // Pictures are of the first format.
+    let images: String = if pictures && row.format != "BC7" {
+        PICTURES
+            .iter()
+            .map(|name| {
+                let file = picture_file(&row.material, &row.map, which, name);
+                format!("<figure><img src=\"pictures/{file}\" alt=\"{name}\" loading=\"lazy\"><figcaption>{name}</figcaption></figure>")
+            })
+            .collect()
+    } else {
+        String::new()
+    };
+    format!("{heading}{words}<div class=\"maps\">{images}</div>\n")
+}

@@ -1,0 +1,346 @@
+//! `kinran detail solve`: one target against its layers.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::vec3;
+use kinran_bake::detail::{
+    Comparison, DetailOptions, Layer, LayerTransform, LevelError, MapKind, Mask, Resolution, Solved, Target,
+    Tile, TileOptions, compare, level_pictures, lowest_resolution, solve,
+};
+use kinran_image::{Image, encode_dds, encode_ktx2, encode_png, read_image, read_texture, write_atomically};
+use serde::Serialize;
+
+use super::layer_flag::layer_flag;
+use super::{BlockFormat, KindName, LayerFlag, default_format};
+use crate::bake::{Container, PresetName};
+use crate::outputs::{check_folder, has_extension};
+use crate::table::table;
+use crate::values::number;
+use crate::{Console, Error};
+
+/// Solves one target: writes NAME_synthesized, its tiles as they were compressed, and NAME.detail.json
+///
+/// The synthesized map `s` is found texel by texel so that the blend of `s` and the tiles is the target: smooth overlay
+/// for colour and data, reoriented normal mapping for normals, "over" for aniso texels. It is solved against the tiles as
+/// the GPU decodes them, level by level.
+///
+/// A layer is FILE,NAME=VALUE,...: scale (4 or 4x2), rotation (degrees), offset, mirror, hue (degrees), saturation and
+/// value (factors), mask, channel (r, g, b, a) and contrast of the mask, y-down. The first layer lies at the bottom;
+/// each of the others needs a mask. FILE is an image, or a tile that was baked before (.ktx2, .dds).
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  kinran detail solve helmet_color.png --layer steel.png,scale=4 -o baked/
+  kinran detail solve wall.png --layer brick.png,scale=6 --layer moss.png,scale=9,mask=masks.png,channel=g -o baked/
+  kinran detail solve wall_normal.png --kind normal --layer brick_normal.png,scale=6 -o baked/
+  kinran detail solve wall.png --layer brick.png,scale=6 --max-error 4 -o baked/ --pictures")]
+pub struct SolveArgs {
+    /// The map to reproduce: an image of 8 or 16 bits or floats
+    #[arg(value_name = "TARGET")]
+    pub target: PathBuf,
+
+    /// A tiled layer, from the bottom up; up to three
+    #[arg(long, value_name = "FILE[,NAME=VALUE]...", required = true, value_parser = layer_flag)]
+    pub layer: Vec<LayerFlag>,
+
+    /// Where the files go; made if it is not there
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+
+    /// What the target and its tiles hold
+    #[arg(long, value_enum, default_value_t)]
+    pub kind: KindName,
+
+    /// Format of the synthesized map [default: bc7, for normals bc5]
+    #[arg(long, value_enum)]
+    pub format: Option<BlockFormat>,
+
+    /// Format of tiles that come as images [default: as --format]
+    #[arg(long, value_enum)]
+    pub tile_format: Option<BlockFormat>,
+
+    /// Time spent on a block of the synthesized map
+    #[arg(long, value_enum)]
+    pub preset: Option<PresetName>,
+
+    /// Opacity of the detail over an aniso target: the shader's parameter
+    #[arg(long, value_name = "0..1", default_value_t = 0.5, value_parser = |t: &str| number(t, 0.0..=1.0))]
+    pub alpha: f32,
+
+    /// Green of a normal target grows downwards (DirectX)
+    #[arg(long)]
+    pub y_down: bool,
+
+    /// Overlay as it is, instead of the smooth one
+    #[arg(long)]
+    pub plain_overlay: bool,
+
+    /// Solve against the tiles as authored, not as the GPU decodes them
+    #[arg(long)]
+    pub no_compensation: bool,
+
+    /// Keep the encoder's blocks, whatever they are blended to
+    #[arg(long)]
+    pub no_choice: bool,
+
+    /// Centre the histogram of the tiles; write the tiles again wherever they are used
+    #[arg(long)]
+    pub center: bool,
+
+    /// The synthesized map gets the lowest resolution whose error, at the target's resolution, is not above this: RMSE in
+    /// steps of 8 bits, degrees for normals
+    #[arg(long, value_name = "ERROR", value_parser = |t: &str| number(t, 0.0..=255.0))]
+    pub max_error: Option<f32>,
+
+    /// Also measure what each part of the method is worth (four more solutions)
+    #[arg(long)]
+    pub compare: bool,
+
+    /// Also write pictures: detail, synthesized, blended, target, errors
+    #[arg(long)]
+    pub pictures: bool,
+
+    /// File format of the textures
+    #[arg(long, value_enum, default_value_t)]
+    pub container: Container,
+
+    /// Zstandard level of KTX2 files, 0 for none
+    #[arg(long, value_name = "LEVEL", default_value_t = 3, value_parser = clap::value_parser!(i32).range(0..=22))]
+    pub zstd: i32,
+}
+
+/// What was solved and how well.
+#[derive(Clone, Debug, Serialize)]
+pub struct SolveReport {
+    /// File name of the target.
+    pub target: String,
+    /// Files written.
+    pub files: Vec<String>,
+    /// Width and height of the target and of `s`.
+    pub target_size: [u32; 2],
+    /// Width and height of `s`.
+    pub size: [u32; 2],
+    /// Errors, level by level.
+    pub levels: Vec<LevelError>,
+    /// For `--max-error`: what each resolution would have cost.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub resolutions: Vec<Resolution>,
+    /// For `--compare`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub comparison: Option<Comparison>,
+}
+
+pub(super) fn run(args: &SolveArgs, console: &Console) -> Result<(), Error> {
+    check_folder(&args.output)?;
+    let report = solve_target(args, console)?;
+    console.result(&report, &text(&report))
+}
+
+/// A tile or mask by its file and how it is to be taken, each read and compressed once.
+type Tiles = BTreeMap<(PathBuf, bool, bool), Tile>;
+
+/// Reads, solves and writes.
+///
+/// # Errors
+/// Whatever is wrong with a file or a flag; each names the file.
+pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, Error> {
+    let kind = MapKind::from(args.kind);
+    let format = args.format.unwrap_or_else(|| default_format(kind));
+    let mut options = DetailOptions::new(format.encoding());
+    if let Some(preset) = args.preset {
+        options.encoding.preset = preset.into();
+    }
+    options.aniso_alpha = args.alpha;
+    options.compensate = !args.no_compensation;
+    options.choose = !args.no_choice;
+    if args.plain_overlay {
+        options.blend = kinran_bake::detail::Blend::Plain;
+    }
+
+    let tiles = read_tiles(args, kind, args.tile_format.unwrap_or(format))?;
+    let tile = |file: &Path, y_down: bool, is_mask: bool| &tiles[&(file.to_path_buf(), y_down, is_mask)];
+    let layers: Vec<Layer> = args
+        .layer
+        .iter()
+        .map(|flag| Layer {
+            tile: tile(&flag.tile, flag.y_down, false),
+            transform: LayerTransform {
+                scale: flag.scale,
+                rotation: flag.rotation.to_radians(),
+                offset: flag.offset,
+                mirror: flag.mirror,
+            },
+            hsv: vec3(flag.hue / 360.0, flag.saturation, flag.value),
+            mask: flag.mask.as_ref().map(|file| Mask {
+                map: tile(file, false, true),
+                channel: flag.channel,
+                contrast: flag.contrast,
+            }),
+        })
+        .collect();
+    let target =
+        named(&args.target, read_image(&args.target).and_then(|i| Target::new(&i, kind, args.y_down)))?;
+    let size = (target.levels[0].width, target.levels[0].height);
+
+    let stage = console.progress().stage("solving", u64::from(size.0) * u64::from(size.1) * 4 / 3);
+    let mut resolutions = Vec::new();
+    if let Some(bound) = args.max_error {
+        let found = lowest_resolution(&target, &layers, &options, bound)?;
+        resolutions = found.resolutions;
+        let Some(level) = found.level else {
+            return Err(Error::Usage(format!(
+                "--max-error {bound}: even at the target's own resolution the error is {:.2}; allow more, or take \
+                 another format or tile",
+                resolutions[0].error
+            )));
+        };
+        options.first_level = level;
+    }
+    let (solved, comparison) = if args.compare {
+        let (comparison, solved) = compare(&target, &layers, &options, &|n| stage.add(n / 4))?;
+        (solved, Some(comparison))
+    } else {
+        (solve(&target, &layers, &options, &|n| stage.add(n))?, None)
+    };
+    drop(stage);
+
+    let stem = file_stem(&args.target);
+    let mut files = write_textures(args, &stem, &solved, &tiles)?;
+    if args.pictures {
+        let pictures = level_pictures(&target, &layers, &options, &solved, 0)?;
+        let named: [(&str, &Image); 7] = [
+            ("detail", &pictures.detail),
+            ("synthesized", &pictures.synthesized),
+            ("blended", &pictures.blended),
+            ("target", &pictures.target),
+            ("compressed_target", &pictures.compressed_target),
+            ("error", &pictures.error),
+            ("target_error", &pictures.target_error),
+        ];
+        for (name, image) in named {
+            let file = format!("{stem}_{name}.png");
+            write_atomically(&args.output.join(&file), &encode_png(image)?)?;
+            files.push(file);
+        }
+    }
+    let first = &solved.texture.levels[0];
+    let report = SolveReport {
+        target: file_name(&args.target),
+        files,
+        target_size: [size.0, size.1],
+        size: [first.width, first.height],
+        levels: solved.levels,
+        resolutions,
+        comparison,
+    };
+    let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
+    write_atomically(&args.output.join(format!("{stem}.detail.json")), &json)?;
+    Ok(report)
+}
+
+fn read_tiles(args: &SolveArgs, kind: MapKind, format: BlockFormat) -> Result<Tiles, Error> {
+    let mut tiles = Tiles::new();
+    for flag in &args.layer {
+        let mut read = |file: &Path, kind: MapKind, y_down: bool, is_mask: bool| -> Result<(), Error> {
+            let key = (file.to_path_buf(), y_down, is_mask);
+            if tiles.contains_key(&key) {
+                return Ok(());
+            }
+            let baked = has_extension(file, "ktx2") || has_extension(file, "dds");
+            let tile = if baked {
+                read_texture(file).and_then(|texture| Tile::from_texture(texture, kind))
+            } else {
+                let encoding = if is_mask { BlockFormat::Bc7.encoding() } else { format.encoding() };
+                let options = TileOptions {
+                    y_down,
+                    center: args.center && !is_mask,
+                    ..TileOptions::new(kind, encoding)
+                };
+                read_image(file).and_then(|image| Tile::new(&image, options))
+            };
+            tiles.insert(key, named(file, tile)?);
+            Ok(())
+        };
+        read(&flag.tile, kind, flag.y_down, false)?;
+        if let Some(mask) = &flag.mask {
+            read(mask, MapKind::Data, false, true)?;
+        }
+    }
+    Ok(tiles)
+}
+
+/// An error that lacks a file's name gets it.
+fn named<T>(file: &Path, result: Result<T, kinran_image::Error>) -> Result<T, Error> {
+    result.map_err(|e| match e {
+        kinran_image::Error::Unsupported(reason) => kinran_image::Error::malformed(file, reason).into(),
+        other => other.into(),
+    })
+}
+
+fn write_textures(
+    args: &SolveArgs,
+    stem: &str,
+    solved: &Solved,
+    tiles: &Tiles,
+) -> Result<Vec<String>, Error> {
+    std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
+    let mut files = Vec::new();
+    let mut write = |name: String, texture: &kinran_image::Texture, map: &str| -> Result<(), Error> {
+        let mut texture = texture.clone();
+        texture.metadata.insert("KinranMap".into(), map.into());
+        for extension in args.container.extensions() {
+            let file = format!("{name}.{extension}");
+            let bytes = match *extension {
+                "dds" => encode_dds(&texture)?,
+                _ => encode_ktx2(&texture, (args.zstd > 0).then_some(args.zstd))?,
+            };
+            write_atomically(&args.output.join(&file), &bytes)?;
+            files.push(file);
+        }
+        Ok(())
+    };
+    write(format!("{stem}_synthesized"), &solved.texture, "synthesized")?;
+    for ((file, ..), tile) in tiles {
+        if !has_extension(file, "ktx2") && !has_extension(file, "dds") {
+            write(file_stem(file), &tile.texture, "detail")?;
+        }
+    }
+    Ok(files)
+}
+
+fn file_stem(path: &Path) -> String {
+    path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// The report for people.
+fn text(report: &SolveReport) -> String {
+    let mut rows = vec![["level", "size", "blended error", "not reached"].map(String::from).to_vec()];
+    if report.comparison.is_some() {
+        rows[0].extend(["target alone", "the talk's", "plain overlay", "uncompensated"].map(String::from));
+    }
+    for (i, level) in report.levels.iter().enumerate() {
+        let mut row = vec![
+            i.to_string(),
+            format!("{}x{}", level.width, level.height),
+            format!("{:.3}", level.error),
+            format!("{:.2} %", 100.0 * level.unreached),
+        ];
+        if let Some(comparison) = &report.comparison {
+            let c = &comparison.levels[i];
+            row.extend([c.target, c.talk, c.plain_overlay, c.uncompensated].map(|e| format!("{e:.3}")));
+        }
+        rows.push(row);
+    }
+    let mut text = table(&rows);
+    if let Some(c) = &report.comparison {
+        text += &format!(
+            "synthesized {} bytes, shared tiles {}; the target alone {}, a unique map as fine as the tiles {}\n",
+            c.synthesized_bytes, c.shared_bytes, c.target_bytes, c.unique_bytes
+        );
+    }
+    text + &format!("wrote {}\n", report.files.join(", "))
+}
