@@ -268,6 +268,669 @@ inline metal::float3 normal_from_xy(
 
 // Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
 // Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_p_s.wesl, by ./x shaders. Needs: nothing else
+
+// P_s: the share of scattered light that a fibre sends down to the base.
+//
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+
+#ifndef KINRAN_FUZZ_P_S_METAL
+#define KINRAN_FUZZ_P_S_METAL
+
+#include <metal_stdlib>
+
+#ifndef KINRAN_FLOAT6ARRAY_METAL
+#define KINRAN_FLOAT6ARRAY_METAL
+struct Float6Array {
+    float inner[6];
+};
+#endif
+
+/// A step of Laguerre's iteration for the largest root of `l³ + square l² + linear l + constant`, whose roots are all
+/// real.
+///
+/// Cost on GCN: 18 instructions (2 at a quarter of the rate).
+inline float fibre_p_s_step(
+    float l,
+    float constant_,
+    float linear,
+    float square
+) {
+    float value = ((((l + square) * l) + linear) * l) + constant_;
+    float slope = (((3.0 * l) + (2.0 * square)) * l) + linear;
+    float bend = (6.0 * l) + (2.0 * square);
+    float root = metal::sqrt(metal::max(((4.0 * slope) * slope) - ((6.0 * value) * bend), 0.0));
+    return l - ((3.0 * value) / metal::max(slope + root, 0.00000000000000000001));
+}
+
+/// P_s of SGGX fibres, exactly (slide: Base Layer, "no analytical expression"): one minus the integral of
+/// `fibre_phase(u, v)` over the `v` above the horizon, for a light at cosines `n_u` ≥ 0 to the normal and `t_u` to the
+/// fibres, whose own cosine to the normal is `t_n`. It is the form factor of an elliptic cone: with the positive root λ
+/// of `χ = λ³ + (α² c + 2 k t_u t_n) λ² - (α² + k (1 - t_u² - t_n²)) λ - α² c`, `c = n_u`, `k = 1 - α²`,
+/// `1 - P_s = λ sqrt((λ + c) (λ + α² c/σ²)) / χ'(λ)`. Laguerre's iteration from 1 falls on λ.
+///
+/// Cost on GCN: 91 instructions (11 at a quarter of the rate).
+inline float fibre_p_s(
+    float n_u,
+    float t_u,
+    float t_n,
+    float alpha
+) {
+    float alpha_sqr = alpha * alpha;
+    float k = 1.0 - alpha_sqr;
+    float constant_1 = -(alpha_sqr) * n_u;
+    float linear = -((alpha_sqr + (k * ((1.0 - (t_u * t_u)) - (t_n * t_n)))));
+    float square = (alpha_sqr * n_u) + (((2.0 * k) * t_u) * t_n);
+    float _e24 = fibre_p_s_step(1.0, constant_1, linear, square);
+    float _e25 = fibre_p_s_step(_e24, constant_1, linear, square);
+    float _e26 = fibre_p_s_step(_e25, constant_1, linear, square);
+    float _e27 = fibre_p_s_step(_e26, constant_1, linear, square);
+    float slope = (((3.0 * _e27) + (2.0 * square)) * _e27) + linear;
+    float area_sqr = 1.0 - ((k * t_u) * t_u);
+    float upward = (_e27 * metal::sqrt((_e27 + n_u) * (_e27 + ((alpha_sqr * n_u) / area_sqr)))) / metal::max(slope, 0.00000000000000000001);
+    return metal::saturate(1.0 - upward);
+}
+
+/// P_s by the talk's six coefficients (slide: Base Layer), fitted for one tilt and one spread: `c_0 + c_1 n_u + c_2 t_u +
+/// c_3 n_u² + c_4 n_u t_u + c_5 t_u²`, clamped to [0, 1]. `kinran fit fuzz` prints them with their error.
+///
+/// Cost on GCN: 5 instructions.
+inline float fuzz_p_s(
+    Float6Array coefficients,
+    float n_u,
+    float t_u
+) {
+    float across = n_u * ((coefficients.inner[1] + (coefficients.inner[3] * n_u)) + (coefficients.inner[4] * t_u));
+    return metal::saturate((coefficients.inner[0] + across) + (t_u * (coefficients.inner[2] + (coefficients.inner[5] * t_u))));
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_phase.wesl, by ./x shaders. Needs: nothing else
+
+// How a fibre scatters: the SGGX phase function of specular fibres, and Schlick's for velvet.
+//
+// Heitz, Dupuy, Crassin, Dachsbacher. The SGGX Microflake Distribution. SIGGRAPH 2015.
+// Schlick. An Inexpensive BRDF Model for Physically-based Rendering. Eurographics 1994.
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+
+#ifndef KINRAN_FUZZ_PHASE_METAL
+#define KINRAN_FUZZ_PHASE_METAL
+
+#include <metal_stdlib>
+
+/// Smallest roughness of fibres to shade with.
+constant float FUZZ_ALPHA_MIN = 0.1;
+
+/// Roughness of fibres from their spread, 0 (combed) to 1 (in all directions): its root, at least FUZZ_ALPHA_MIN.
+///
+/// Cost on GCN: 2 instructions (1 at a quarter of the rate).
+inline float fuzz_alpha(
+    float spread
+) {
+    return metal::sqrt(metal::max(spread, 0.010000001));
+}
+
+/// Schlick's k of the velvet phase from the fibres' spread: `1 - spread`, at most 0.99.
+///
+/// Cost on GCN: 2 instructions.
+inline float velvet_k(
+    float spread
+) {
+    return 1.0 - metal::max(spread, 0.010000001);
+}
+
+/// Direction of fibres in a frame with z along the normal: `tilt` away from the normal (0 upright, π/2 lying),
+/// `azimuth` counter-clockwise from x, both in radians.
+///
+/// Cost on GCN: 10 instructions (4 at a quarter of the rate).
+inline metal::float3 fibre_direction(
+    float tilt,
+    float azimuth
+) {
+    float sine = metal::sin(tilt);
+    return metal::float3(sine * metal::cos(azimuth), sine * metal::sin(azimuth), metal::cos(tilt));
+}
+
+/// Distribution of the fibres' microflake normals at cosine `t_h` to their direction, per steradian over the sphere
+/// (slide: Phase Function, `D_F`): `α³ / (π (t_h² (1 - α²) + α²)²)`.
+///
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
+inline float fibre_d(
+    float t_h,
+    float alpha
+) {
+    float alpha_sqr = alpha * alpha;
+    float q = ((t_h * t_h) * (1.0 - alpha_sqr)) + alpha_sqr;
+    return (alpha_sqr * alpha) / ((3.1415927 * q) * q);
+}
+
+/// Projected area of the fibres' microflakes along a direction at cosine `t_w` to them (slide: Phase Function, `σ_F`):
+/// `sqrt(1 - t_w² (1 - α²))`.
+///
+/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
+inline float fibre_projected_area(
+    float t_w,
+    float alpha
+) {
+    return metal::sqrt(1.0 - ((t_w * t_w) * (1.0 - (alpha * alpha))));
+}
+
+/// The fibres' phase function per steradian (slide: Phase Function, `p_F`): `D_F(h) / (4 σ_F(u))` for light from `u`
+/// and a view along `v`, from `u_v = u·v`, `t_u = t·u` and `t_v = t·v`. Not symmetric.
+///
+/// Cost on GCN: 18 instructions (2 at a quarter of the rate).
+inline float fibre_phase(
+    float u_v,
+    float t_u,
+    float t_v,
+    float alpha
+) {
+    float w = 2.000002 + (2.0 * u_v);
+    float s = t_u + t_v;
+    float alpha_sqr = alpha * alpha;
+    float k = 1.0 - alpha_sqr;
+    float m = ((s * s) * k) + (alpha_sqr * w);
+    return ((((alpha_sqr * alpha) * w) * w) * metal::rsqrt(1.0 - ((t_u * t_u) * k))) / ((12.566371 * m) * m);
+}
+
+/// Normalisation r(k) of the velvet phase: `sqrt(1-k) / (1 + (2 sqrt(2) - 1) k)`, for k in [0, 0.99]. With it the phase
+/// scatters at most what arrives, and 0.88 of it at least for light across the fibres.
+///
+/// Cost on GCN: 5 instructions (2 at a quarter of the rate).
+inline float velvet_normalization(
+    float k
+) {
+    return metal::sqrt(1.0 - k) / (1.0 + (1.8284271 * k));
+}
+
+/// The velvet phase per steradian (slide: Velvet Scattering, `p_V`): `r(k) (1-k²) / (4π (1 - k sin(t, h))²)`, arguments
+/// as in `fibre_phase`, k in [0, 0.99] as `velvet_k` gives it. The slide's k has the other sign, which scatters forward.
+///
+/// Cost on GCN: 19 instructions (5 at a quarter of the rate).
+inline float velvet_phase(
+    float u_v,
+    float t_u,
+    float t_v,
+    float k
+) {
+    float w = 2.000002 + (2.0 * u_v);
+    float s = t_u + t_v;
+    float q = 1.0 - (k * metal::sqrt(metal::max(1.0 - ((s * s) / w), 0.0)));
+    float _e19 = velvet_normalization(k);
+    return (_e19 * (1.0 - (k * k))) / ((12.566371 * q) * q);
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_layer.wesl, by ./x shaders. Needs: fuzz_phase
+
+// The layer of fibres: what it scatters to the viewer and what it leaves of the base.
+//
+// Koenderink, Pont. The Secret of Velvety Skin. Machine Vision and Applications 2003.
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+
+#ifndef KINRAN_FUZZ_LAYER_METAL
+#define KINRAN_FUZZ_LAYER_METAL
+
+#include <metal_stdlib>
+
+
+/// What the layer's lobe needs of a view, once a pixel.
+struct FuzzView {
+    float n_v;
+    float t_v;
+    float escaped;
+    float exponent;
+    float alpha_sqr;
+    float scale;
+};
+
+/// What the layer makes of a light.
+struct FuzzLight {
+    float lobe;
+    float penetrated;
+};
+
+/// Share of light that passes the layer along a direction at cosine `n_w` to the normal without meeting a fibre:
+/// `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
+///
+/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
+inline float fuzz_passage(
+    float density,
+    float n_w
+) {
+    return metal::exp2((-1.442695 * density) / n_w);
+}
+
+/// The layer's BRDF for a fibre albedo of one (slide: New Model): `p (1 - passed) / (n_u + n_v)`, where `passed` is
+/// `fuzz_passage` along the light times that along the view, and `phase` the phase function. Cosines must be positive.
+///
+/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
+inline float fuzz_layer(
+    float phase,
+    float passed,
+    float n_u,
+    float n_v
+) {
+    return (phase * (1.0 - passed)) / (n_u + n_v);
+}
+
+/// BRDF of a layer of SGGX fibres for an albedo of one, per steradian, zero below the horizon; `u` light, `v` view and
+/// `t` fibre direction are unit vectors in a frame with z along the normal. Not reciprocal: `f(u, v) σ(u) = f(v, u)
+/// σ(v)`.
+///
+/// Cost on GCN: 41 instructions (6 at a quarter of the rate).
+inline float fuzz_brdf(
+    metal::float3 u,
+    metal::float3 v,
+    metal::float3 t,
+    float density,
+    float alpha
+) {
+    float _e6 = fuzz_passage(density, u.z);
+    float _e8 = fuzz_passage(density, v.z);
+    float passed = _e6 * _e8;
+    float _e13 = fibre_phase(metal::dot(u, v), metal::dot(t, u), metal::dot(t, v), alpha);
+    float _e16 = fuzz_layer(_e13, passed, u.z, v.z);
+    return (metal::min(u.z, v.z) > 0.0) ? _e16 : 0.0;
+}
+
+/// `fuzz_brdf` with the velvet phase of asymmetry `k`; reciprocal.
+///
+/// Cost on GCN: 42 instructions (9 at a quarter of the rate).
+inline float fuzz_velvet_brdf(
+    metal::float3 u,
+    metal::float3 v,
+    metal::float3 t,
+    float density,
+    float k
+) {
+    float _e6 = fuzz_passage(density, u.z);
+    float _e8 = fuzz_passage(density, v.z);
+    float passed = _e6 * _e8;
+    float _e13 = velvet_phase(metal::dot(u, v), metal::dot(t, u), metal::dot(t, v), k);
+    float _e16 = fuzz_layer(_e13, passed, u.z, v.z);
+    return (metal::min(u.z, v.z) > 0.0) ? _e16 : 0.0;
+}
+
+/// BRDF of a layer whose extinction follows the fibres' projected area, as in a true microflake volume:
+/// `D/4 (1 - e^(-d (σ_u/n_u + σ_v/n_v))) / (σ_v n_u + σ_u n_v)`. Reciprocal.
+///
+/// Cost on GCN: 52 instructions (8 at a quarter of the rate).
+inline float fuzz_reciprocal_brdf(
+    metal::float3 u,
+    metal::float3 v,
+    metal::float3 t,
+    float density,
+    float alpha
+) {
+    metal::float3 h = metal::normalize(u + v);
+    float _e8 = fibre_projected_area(metal::dot(t, u), alpha);
+    float _e10 = fibre_projected_area(metal::dot(t, v), alpha);
+    float _e13 = fuzz_passage(density * _e8, u.z);
+    float _e16 = fuzz_passage(density * _e10, v.z);
+    float passed = _e13 * _e16;
+    float _e19 = fibre_d(metal::dot(t, h), alpha);
+    float value = ((0.25 * _e19) * (1.0 - passed)) / ((_e10 * u.z) + (_e8 * v.z));
+    return (metal::min(u.z, v.z) > 0.0) ? value : 0.0;
+}
+
+/// Prepares `fuzz_light` for a view at cosine `n_v` > 0 to the normal and `t_v` to the fibres.
+///
+/// Cost on GCN: 7 instructions (2 at a quarter of the rate).
+inline FuzzView fuzz_view(
+    float n_v,
+    float t_v,
+    float density,
+    float alpha
+) {
+    float exponent = -1.442695 * density;
+    float alpha_sqr = alpha * alpha;
+    return FuzzView {n_v, t_v, metal::exp2(exponent / n_v), exponent, alpha_sqr, (alpha_sqr * alpha) * 0.07957747};
+}
+
+/// Lobe and penetration for a light at cosines `n_u` > 0 to the normal, `t_u` to the fibres and `u_v` to the view:
+/// `fuzz_brdf` with one exponential for both. The cosines are the same in every frame.
+///
+/// Cost on GCN: 22 instructions (4 at a quarter of the rate).
+inline FuzzLight fuzz_light(
+    FuzzView view,
+    float n_u,
+    float t_u,
+    float u_v
+) {
+    float penetrated = metal::exp2(view.exponent / n_u);
+    float w = 2.000002 + (2.0 * u_v);
+    float s = t_u + view.t_v;
+    float k = 1.0 - view.alpha_sqr;
+    float m = ((s * s) * k) + (view.alpha_sqr * w);
+    float scattered = 1.0 - (penetrated * view.escaped);
+    float lobe = ((((view.scale * scattered) * w) * w) * metal::rsqrt(1.0 - ((t_u * t_u) * k))) / ((m * m) * (n_u + view.n_v));
+    return FuzzLight {lobe, penetrated};
+}
+
+/// Factor on the base's BRDF (slide: Base Layer, `c_atten`): `(P_p + c_f (1 - P_p) P_s) P_e`, for the share `penetrated`
+/// that reaches the base, `escaped` that leaves it towards the viewer, and `downward` (P_s) of the scattered light that
+/// goes down. With `downward` = 0 it is the talk's cheaper variant.
+///
+/// Cost on GCN: 8 instructions.
+inline metal::float3 fuzz_attenuation(
+    float penetrated,
+    float escaped,
+    float downward,
+    metal::float3 fibre_color
+) {
+    float scattered = downward - (penetrated * downward);
+    return metal::float3(penetrated * escaped) + ((fibre_color * escaped) * scattered);
+}
+
+/// The normal for the layer, between the normal-mapped `n` and the mesh's `vertex_normal` (slide: Deferred):
+/// `smoothness` 0 keeps `n`, 1 takes the mesh's.
+///
+/// Cost on GCN: 13 instructions (1 at a quarter of the rate).
+inline metal::float3 fuzz_smooth_normal(
+    metal::float3 n,
+    metal::float3 vertex_normal,
+    float smoothness
+) {
+    return metal::normalize(n + ((vertex_normal - n) * smoothness));
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_ambient.wesl, by ./x shaders. Needs: fuzz_layer
+
+// The layer of fibres in light from all around, given as order-2 spherical harmonics.
+//
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+//
+// Ambient light of the layer is `c_f fuzz_g fuzz_ambient_factor fuzz_ambient_radiance`: the mean of the layer's
+// geometry, a polynomial for what the phase function gathers, and the light along the lobe's mean direction. The talk
+// has `1 - P_s(v)` for the second and the hemisphere's mean for the third.
+
+#ifndef KINRAN_FUZZ_AMBIENT_METAL
+#define KINRAN_FUZZ_AMBIENT_METAL
+
+#include <metal_stdlib>
+
+
+#ifndef KINRAN_FLOAT4ARRAY_METAL
+#define KINRAN_FLOAT4ARRAY_METAL
+struct Float4Array {
+    float inner[4];
+};
+#endif
+
+#ifndef KINRAN_FLOAT2ARRAY_METAL
+#define KINRAN_FLOAT2ARRAY_METAL
+struct Float2Array {
+    float inner[2];
+};
+#endif
+
+#ifndef KINRAN_FLOAT8ARRAY_METAL
+#define KINRAN_FLOAT8ARRAY_METAL
+struct Float8Array {
+    float inner[8];
+};
+#endif
+
+#ifndef KINRAN_FLOAT3X9ARRAY_METAL
+#define KINRAN_FLOAT3X9ARRAY_METAL
+struct Float3x9Array {
+    metal::float3 inner[9];
+};
+#endif
+
+/// Mean over the hemisphere of the layer's BRDF times cosine over phase (slide: Ambient Lighting, `G~`), for a view at
+/// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
+/// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002.
+///
+/// Cost on GCN: 15 instructions (4 at a quarter of the rate).
+inline float fuzz_g(
+    float density,
+    float n_v
+) {
+    float dense = 1.0 - (n_v * metal::log(1.0 + (1.0 / n_v)));
+    float y = density / (n_v * dense);
+    float e = metal::exp2(-1.442695 * y);
+    return (dense * (1.0 - e)) * (1.0 - ((0.1 * y) * e));
+}
+
+/// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients.
+///
+/// Cost on GCN: 8 instructions (1 at a quarter of the rate).
+inline float fuzz_g_talk(
+    Float4Array coefficients,
+    float density,
+    float n_v
+) {
+    float above = 1.0 + (n_v * (coefficients.inner[0] + (coefficients.inner[1] * n_v)));
+    return (density * above) / (density + (n_v * (coefficients.inner[2] + ((coefficients.inner[3] * n_v) * n_v))));
+}
+
+/// Share of uniform irradiance that reaches the base unscattered, `2 E_3(d)` (slide: Ambient Shadowing, `Q~`); within
+/// 0.00043 for densities in [0, 3].
+///
+/// Cost on GCN: 11 instructions (2 at a quarter of the rate).
+inline float fuzz_q(
+    float density
+) {
+    float above = 1.0 + (density * (3.07323 + (0.102541 * density)));
+    float _e9 = fuzz_passage(density, 1.0);
+    return (_e9 * above) / (1.0 + (density * (4.02006 + (1.98275 * density))));
+}
+
+/// The talk's form of `fuzz_q`, `1 + c_0 d + c_1 d²`, by two coefficients; turns up outside the range of its fit.
+///
+/// Cost on GCN: 2 instructions.
+inline float fuzz_q_talk(
+    Float2Array coefficients,
+    float density
+) {
+    return 1.0 + (density * (coefficients.inner[0] + (coefficients.inner[1] * density)));
+}
+
+/// What the phase function gathers of uniform light, over `fuzz_g`, as a polynomial of the view fitted for one tilt and
+/// one spread over densities of 0.05 to 0.5: the talk's six terms and the third and fourth power of `t_v`.
+///
+/// Cost on GCN: 8 instructions.
+inline float fuzz_ambient_factor(
+    Float8Array coefficients,
+    float n_v,
+    float t_v
+) {
+    float along = t_v * (coefficients.inner[2] + (t_v * (coefficients.inner[5] + (t_v * (coefficients.inner[6] + (t_v * coefficients.inner[7]))))));
+    float across = n_v * ((coefficients.inner[1] + (coefficients.inner[3] * n_v)) + (coefficients.inner[4] * t_v));
+    return metal::max((coefficients.inner[0] + across) + along, 0.0);
+}
+
+/// Where the table that replaces `fuzz_ambient_factor` for combed fibres is read, each in [0, 1]: x is `n_v`, y runs
+/// with the cosine of the azimuth between view and fibre. `t_n` is `t·n`.
+///
+/// Cost on GCN: 7 instructions (1 at a quarter of the rate).
+inline metal::float2 fuzz_ambient_place(
+    float n_v,
+    float t_v,
+    float t_n
+) {
+    float sines = metal::sqrt(metal::max((1.0 - (n_v * n_v)) * (1.0 - (t_n * t_n)), 0.000000000001));
+    return metal::float2(n_v, metal::saturate(0.5 + ((0.5 * (t_v - (n_v * t_n))) / sines)));
+}
+
+/// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a
+/// dense one adds to it.
+///
+/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
+inline float fuzz_ambient_tabulated(
+    metal::float2 texel,
+    float density,
+    float n_v
+) {
+    return texel.x + ((texel.y * density) / (density + n_v));
+}
+
+/// Mean direction of the light that the lobe gathers, shorter than one, by four coefficients of the same fit:
+/// `c_0 n + c_1 v + (c_2 + c_3 t_v) t`.
+///
+/// Cost on GCN: 13 instructions.
+inline metal::float3 fuzz_ambient_direction(
+    Float4Array coefficients,
+    metal::float3 n,
+    metal::float3 v,
+    metal::float3 t
+) {
+    return ((n * coefficients.inner[0]) + (v * coefficients.inner[1])) + (t * (coefficients.inner[2] + (coefficients.inner[3] * metal::dot(t, v))));
+}
+
+/// Mean radiance in the lobe, from the coefficients of `radiance` up to order 1 and `fuzz_ambient_direction`; exact for
+/// light that varies linearly with direction. Never negative.
+///
+/// Cost on GCN: 18 instructions.
+inline metal::float3 fuzz_ambient_radiance(
+    Float3x9Array radiance,
+    metal::float3 direction
+) {
+    metal::float3 linear = ((radiance.inner[3] * direction.x) + (radiance.inner[1] * direction.y)) + (radiance.inner[2] * direction.z);
+    return metal::max((radiance.inner[0] * 0.2820948) + (linear * 0.48860252), metal::float3(0.0));
+}
+
+/// Mean radiance over the hemisphere about the unit vector `n`: the talk's light. Never negative.
+///
+/// Cost on GCN: 21 instructions.
+inline metal::float3 fuzz_ambient_mean(
+    Float3x9Array radiance,
+    metal::float3 n
+) {
+    metal::float3 _e4 = fuzz_ambient_radiance(radiance, n * 0.5);
+    return _e4;
+}
+
+/// Factor on the base's ambient light, diffuse or from a specular probe (slide: Ambient Shadowing, `c_atten`):
+/// `P_e (Q + c_f R (1 - Q))`. `downward` is R, the mean of P_s over uniform irradiance, which depends on tilt and spread;
+/// 1/2 for fibres in all directions. The slide's R lacks a 1/π.
+///
+/// Cost on GCN: 8 instructions.
+inline metal::float3 fuzz_ambient_attenuation(
+    float escaped,
+    float q,
+    float downward,
+    metal::float3 fibre_color
+) {
+    return (metal::float3(q) + (fibre_color * (downward * (1.0 - q)))) * escaped;
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_deferred.wesl, by ./x shaders. Needs: fuzz_layer, fuzz_phase
+
+// Fuzz by seven bits of a G-buffer: fixed fibres over Lambert, for moss and felt.
+//
+// McAuley. Extension to Energy-Conserving Wrapped Diffuse. 2013.
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+
+#ifndef KINRAN_FUZZ_DEFERRED_METAL
+#define KINRAN_FUZZ_DEFERRED_METAL
+
+#include <metal_stdlib>
+
+
+/// Density of the layer.
+constant float FUZZ_DEFERRED_DENSITY = 0.5;
+
+/// Roughness of the fibres: a spread of 0.9. They stand along the normal.
+constant float FUZZ_DEFERRED_ALPHA = 0.9486833;
+
+/// Albedo of the fibres over that of the Lambert base.
+constant float FUZZ_DEFERRED_ALBEDO = 5.0;
+
+/// How far light wraps around the terminator, as a cosine.
+constant float FUZZ_WRAP = 0.2;
+
+/// The cosine of light and normal, softened by wrapping (McAuley 2013; slide: Deferred), n = 2:
+/// `(1+n)/(2(1+w)) (max(n_u + w, 0)/(1+w))^n`. Its integral over the sphere is π. Where no light arrives it is 1e-8
+/// rather than zero, so that the layer may divide by it.
+///
+/// Cost on GCN: 4 instructions.
+inline float fuzz_wrap(
+    float n_u
+) {
+    float c = metal::max(n_u + FUZZ_WRAP, 0.0001);
+    return (0.86805546 * c) * c;
+}
+
+/// P_e of the deferred layer, once a pixel.
+///
+/// Cost on GCN: 3 instructions (2 at a quarter of the rate).
+inline float fuzz_deferred_escape(
+    float n_v
+) {
+    float _e2 = fuzz_passage(FUZZ_DEFERRED_DENSITY, n_v);
+    return _e2;
+}
+
+/// BRDF times cosine of the deferred layer for a fibre albedo of one, from the cosines of light and view with the normal
+/// and with each other and `fuzz_deferred_escape`. Lights down to `n_u = -FUZZ_WRAP` reach it. The picture is
+/// `lerp(Lambert, this, fuzziness)`; the base is not shadowed.
+///
+/// Cost on GCN: 28 instructions (5 at a quarter of the rate).
+inline float fuzz_deferred(
+    float n_u,
+    float n_v,
+    float u_v,
+    float escaped
+) {
+    float _e4 = fuzz_wrap(n_u);
+    float _e6 = fuzz_passage(FUZZ_DEFERRED_DENSITY, _e4);
+    float passed = _e6 * escaped;
+    float _e9 = fibre_phase(u_v, n_u, n_v, FUZZ_DEFERRED_ALPHA);
+    return ((_e9 * (1.0 - passed)) * _e4) / (_e4 + n_v);
+}
+
+/// Albedo of the fibres over a Lambert base of albedo `base`: `5 base`, as the talk has it, but no more than the layer
+/// can have without returning more than arrives. The talk's alone exceeds one at grazing where `base` is above 0.35.
+///
+/// Cost on GCN: 8 instructions.
+inline metal::float3 fuzz_deferred_color(
+    metal::float3 base,
+    float n_v
+) {
+    return metal::min(base * FUZZ_DEFERRED_ALBEDO, metal::float3(1.7241 + (7.5257 * n_v)));
+}
+
+/// Eight bits of a G-buffer, a whole number from 0 to 255, from a fuzziness in [0, 1], rounded to 1/127, below a `flag` in
+/// the top bit (0 or 1: translucency, in the talk). A channel of the format unorm8 wants it over 255.
+///
+/// Cost on GCN: 4 instructions.
+inline float fuzziness_code(
+    float fuzziness,
+    float flag
+) {
+    return (128.0 * flag) + metal::floor((metal::saturate(fuzziness) * 127.0) + 0.5);
+}
+
+/// Fuzziness of eight bits, the flag left out. What a channel of the format unorm8 gives, times 255, need not be whole.
+///
+/// Cost on GCN: 4 instructions.
+inline float fuzziness_from_code(
+    float code
+) {
+    return (code - ((code > 127.5) ? 128.0 : 0.0)) * 0.007874016;
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
 // Made from src/multiscatter.wesl, by ./x shaders. Needs: nothing else
 
 // Energy that microfacet models lose between the facets, given back.
@@ -329,17 +992,17 @@ inline metal::float3 multiscatter_compensation(
 
 #include <metal_stdlib>
 
-#ifndef KINRAN_FLOAT9ARRAY_METAL
-#define KINRAN_FLOAT9ARRAY_METAL
-struct Float9Array {
-    float inner[9];
-};
-#endif
-
 #ifndef KINRAN_FLOAT3X9ARRAY_METAL
 #define KINRAN_FLOAT3X9ARRAY_METAL
 struct Float3x9Array {
     metal::float3 inner[9];
+};
+#endif
+
+#ifndef KINRAN_FLOAT9ARRAY_METAL
+#define KINRAN_FLOAT9ARRAY_METAL
+struct Float9Array {
+    float inner[9];
 };
 #endif
 
@@ -1007,6 +1670,120 @@ inline float ggx_vndf_pdf(
     float g_over_n_v = 2.0 / (v.z + metal::length(v * metal::float3(alpha_t, alpha_b, 1.0)));
     float _e20 = ggx_aniso_d(h, alpha_t, alpha_b);
     return (g_over_n_v * metal::max(metal::dot(v, h), 0.0)) * _e20;
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_sampling.wesl, by ./x shaders. Needs: fuzz_phase, ggx
+
+// Light directions for a view, where a layer of fibres and its base scatter from.
+//
+// Heitz, Dupuy, Crassin, Dachsbacher. The SGGX Microflake Distribution. SIGGRAPH 2015.
+
+#ifndef KINRAN_FUZZ_SAMPLING_METAL
+#define KINRAN_FUZZ_SAMPLING_METAL
+
+#include <metal_stdlib>
+
+
+/// A light direction distributed as `fuzz_pdf` for the view `v`, from two uniform numbers in [0, 1): `v` reflected on a
+/// visible normal of the fibres (Heitz 2015, section 4). It may lie below the horizon, where the layer receives nothing:
+/// the density covers the sphere.
+///
+/// Cost on GCN: 58 instructions (6 at a quarter of the rate).
+inline metal::float3 fuzz_sample(
+    metal::float3 v,
+    metal::float3 t,
+    float alpha,
+    metal::float2 xi
+) {
+    metal::float3 squeezed_v = v - (t * ((1.0 - alpha) * metal::dot(t, v)));
+    float phi = 6.2831855 * xi.x;
+    float z = 1.0 - (2.0 * xi.y);
+    float r = metal::sqrt(metal::max(1.0 - (z * z), 0.0));
+    metal::float3 axis = metal::normalize(squeezed_v);
+    metal::float3 sum = metal::float3(r * metal::cos(phi), r * metal::sin(phi), z) + axis;
+    metal::float3 m = metal::normalize((metal::dot(sum, sum) > 0.000000000001) ? sum : axis);
+    metal::float3 h = metal::normalize(m - (t * ((1.0 - alpha) * metal::dot(t, m))));
+    return (h * (2.0 * metal::dot(v, h))) - v;
+}
+
+/// Density per steradian of `fuzz_sample`: `D_F(h) / (4 σ_F(v))`.
+///
+/// Cost on GCN: 27 instructions (2 at a quarter of the rate).
+inline float fuzz_pdf(
+    metal::float3 u,
+    metal::float3 v,
+    metal::float3 t,
+    float alpha
+) {
+    float _e7 = fibre_phase(metal::dot(u, v), metal::dot(t, v), metal::dot(t, u), alpha);
+    return _e7;
+}
+
+/// Probabilities of sampling the layer, the base's specular lobe and its diffuse one, in proportion to the light that
+/// each is expected to send; each at least 5 % of the largest, so that a wrong guess only adds noise.
+///
+/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
+inline metal::float3 fuzz_over_base_shares(
+    float fuzz,
+    float specular,
+    float diffuse
+) {
+    float least = 0.05 * metal::max(metal::max(fuzz, metal::max(specular, diffuse)), 0.000001);
+    metal::float3 shares = metal::max(metal::float3(fuzz, specular, diffuse), metal::float3(least));
+    return shares / metal::float3((shares.x + shares.y) + shares.z);
+}
+
+/// A light direction for a layer of fibres over GGX and Lambert, distributed as `fuzz_over_base_pdf`; vectors in the
+/// frame of the alphas, z along the normal, `shares` as `fuzz_over_base_shares` gives them.
+///
+/// Cost on GCN: 118 instructions (18 at a quarter of the rate).
+inline metal::float3 fuzz_over_base_sample(
+    metal::float3 v,
+    metal::float3 t,
+    float alpha,
+    float alpha_t,
+    float alpha_b,
+    metal::float3 shares,
+    metal::float2 xi
+) {
+    if (xi.x < shares.x) {
+        metal::float3 _e15 = fuzz_sample(v, t, alpha, metal::float2(xi.x / shares.x, xi.y));
+        return _e15;
+    }
+    float rest = xi.x - shares.x;
+    if (rest < shares.y) {
+        metal::float3 _e25 = ggx_vndf_sample(v, alpha_t, alpha_b, metal::float2(rest / shares.y, xi.y));
+        return (_e25 * (2.0 * metal::dot(v, _e25))) - v;
+    }
+    float x = metal::saturate((rest - shares.y) / shares.z);
+    float phi = 6.2831855 * xi.y;
+    float r = metal::sqrt(x);
+    return metal::float3(r * metal::cos(phi), r * metal::sin(phi), metal::sqrt(1.0 - x));
+}
+
+/// Density per steradian of `fuzz_over_base_sample`, over the sphere.
+///
+/// Cost on GCN: 84 instructions (7 at a quarter of the rate).
+inline float fuzz_over_base_pdf(
+    metal::float3 u,
+    metal::float3 v,
+    metal::float3 t,
+    float alpha,
+    float alpha_t,
+    float alpha_b,
+    metal::float3 shares
+) {
+    metal::float3 sum = u + v;
+    metal::float3 h = metal::normalize((metal::dot(sum, sum) > 0.000000000001) ? sum : t);
+    float _e13 = ggx_vndf_pdf(v, h, alpha_t, alpha_b);
+    float specular = _e13 / metal::max(4.0 * metal::dot(v, h), 0.000000000001);
+    float diffuse = metal::max(u.z, 0.0) * 0.31830987;
+    float _e26 = fuzz_pdf(u, v, t, alpha);
+    return ((shares.x * _e26) + (shares.y * specular)) + (shares.z * diffuse);
 }
 
 #endif

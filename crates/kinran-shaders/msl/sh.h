@@ -14,17 +14,17 @@
 
 #include <metal_stdlib>
 
-#ifndef KINRAN_FLOAT9ARRAY_METAL
-#define KINRAN_FLOAT9ARRAY_METAL
-struct Float9Array {
-    float inner[9];
-};
-#endif
-
 #ifndef KINRAN_FLOAT3X9ARRAY_METAL
 #define KINRAN_FLOAT3X9ARRAY_METAL
 struct Float3x9Array {
     metal::float3 inner[9];
+};
+#endif
+
+#ifndef KINRAN_FLOAT9ARRAY_METAL
+#define KINRAN_FLOAT9ARRAY_METAL
+struct Float9Array {
+    float inner[9];
 };
 #endif
 

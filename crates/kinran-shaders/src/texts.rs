@@ -25,6 +25,21 @@ pub mod wesl {
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../src/frame.wesl");
 
+    /// The module `fuzz_p_s`.
+    pub const FUZZ_P_S: &str = include_str!("../src/fuzz_p_s.wesl");
+
+    /// The module `fuzz_phase`.
+    pub const FUZZ_PHASE: &str = include_str!("../src/fuzz_phase.wesl");
+
+    /// The module `fuzz_layer`.
+    pub const FUZZ_LAYER: &str = include_str!("../src/fuzz_layer.wesl");
+
+    /// The module `fuzz_ambient`.
+    pub const FUZZ_AMBIENT: &str = include_str!("../src/fuzz_ambient.wesl");
+
+    /// The module `fuzz_deferred`.
+    pub const FUZZ_DEFERRED: &str = include_str!("../src/fuzz_deferred.wesl");
+
     /// The module `multiscatter`.
     pub const MULTISCATTER: &str = include_str!("../src/multiscatter.wesl");
 
@@ -43,6 +58,9 @@ pub mod wesl {
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../src/ggx.wesl");
 
+    /// The module `fuzz_sampling`.
+    pub const FUZZ_SAMPLING: &str = include_str!("../src/fuzz_sampling.wesl");
+
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../src/sggx.wesl");
 
@@ -54,12 +72,18 @@ pub mod wesl {
         Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
         Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "fuzz_p_s", text: FUZZ_P_S, needs: &[] },
+        Module { name: "fuzz_phase", text: FUZZ_PHASE, needs: &[] },
+        Module { name: "fuzz_layer", text: FUZZ_LAYER, needs: &["fuzz_phase"] },
+        Module { name: "fuzz_ambient", text: FUZZ_AMBIENT, needs: &["fuzz_layer"] },
+        Module { name: "fuzz_deferred", text: FUZZ_DEFERRED, needs: &["fuzz_layer", "fuzz_phase"] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
         Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];
 }
@@ -89,6 +113,21 @@ pub mod wgsl {
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../wgsl/frame.wgsl");
 
+    /// The module `fuzz_p_s`.
+    pub const FUZZ_P_S: &str = include_str!("../wgsl/fuzz_p_s.wgsl");
+
+    /// The module `fuzz_phase`.
+    pub const FUZZ_PHASE: &str = include_str!("../wgsl/fuzz_phase.wgsl");
+
+    /// The module `fuzz_layer`.
+    pub const FUZZ_LAYER: &str = include_str!("../wgsl/fuzz_layer.wgsl");
+
+    /// The module `fuzz_ambient`.
+    pub const FUZZ_AMBIENT: &str = include_str!("../wgsl/fuzz_ambient.wgsl");
+
+    /// The module `fuzz_deferred`.
+    pub const FUZZ_DEFERRED: &str = include_str!("../wgsl/fuzz_deferred.wgsl");
+
     /// The module `multiscatter`.
     pub const MULTISCATTER: &str = include_str!("../wgsl/multiscatter.wgsl");
 
@@ -107,6 +146,9 @@ pub mod wgsl {
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../wgsl/ggx.wgsl");
 
+    /// The module `fuzz_sampling`.
+    pub const FUZZ_SAMPLING: &str = include_str!("../wgsl/fuzz_sampling.wgsl");
+
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../wgsl/sggx.wgsl");
 
@@ -121,12 +163,18 @@ pub mod wgsl {
         Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
         Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "fuzz_p_s", text: FUZZ_P_S, needs: &[] },
+        Module { name: "fuzz_phase", text: FUZZ_PHASE, needs: &[] },
+        Module { name: "fuzz_layer", text: FUZZ_LAYER, needs: &["fuzz_phase"] },
+        Module { name: "fuzz_ambient", text: FUZZ_AMBIENT, needs: &["fuzz_layer"] },
+        Module { name: "fuzz_deferred", text: FUZZ_DEFERRED, needs: &["fuzz_layer", "fuzz_phase"] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
         Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];
 }
@@ -156,6 +204,21 @@ pub mod glsl_450 {
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../glsl_450/frame.glsl");
 
+    /// The module `fuzz_p_s`.
+    pub const FUZZ_P_S: &str = include_str!("../glsl_450/fuzz_p_s.glsl");
+
+    /// The module `fuzz_phase`.
+    pub const FUZZ_PHASE: &str = include_str!("../glsl_450/fuzz_phase.glsl");
+
+    /// The module `fuzz_layer`.
+    pub const FUZZ_LAYER: &str = include_str!("../glsl_450/fuzz_layer.glsl");
+
+    /// The module `fuzz_ambient`.
+    pub const FUZZ_AMBIENT: &str = include_str!("../glsl_450/fuzz_ambient.glsl");
+
+    /// The module `fuzz_deferred`.
+    pub const FUZZ_DEFERRED: &str = include_str!("../glsl_450/fuzz_deferred.glsl");
+
     /// The module `multiscatter`.
     pub const MULTISCATTER: &str = include_str!("../glsl_450/multiscatter.glsl");
 
@@ -174,6 +237,9 @@ pub mod glsl_450 {
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../glsl_450/ggx.glsl");
 
+    /// The module `fuzz_sampling`.
+    pub const FUZZ_SAMPLING: &str = include_str!("../glsl_450/fuzz_sampling.glsl");
+
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../glsl_450/sggx.glsl");
 
@@ -188,12 +254,18 @@ pub mod glsl_450 {
         Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
         Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "fuzz_p_s", text: FUZZ_P_S, needs: &[] },
+        Module { name: "fuzz_phase", text: FUZZ_PHASE, needs: &[] },
+        Module { name: "fuzz_layer", text: FUZZ_LAYER, needs: &["fuzz_phase"] },
+        Module { name: "fuzz_ambient", text: FUZZ_AMBIENT, needs: &["fuzz_layer"] },
+        Module { name: "fuzz_deferred", text: FUZZ_DEFERRED, needs: &["fuzz_layer", "fuzz_phase"] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
         Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];
 }
@@ -223,6 +295,21 @@ pub mod glsl_es_300 {
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../glsl_es_300/frame.glsl");
 
+    /// The module `fuzz_p_s`.
+    pub const FUZZ_P_S: &str = include_str!("../glsl_es_300/fuzz_p_s.glsl");
+
+    /// The module `fuzz_phase`.
+    pub const FUZZ_PHASE: &str = include_str!("../glsl_es_300/fuzz_phase.glsl");
+
+    /// The module `fuzz_layer`.
+    pub const FUZZ_LAYER: &str = include_str!("../glsl_es_300/fuzz_layer.glsl");
+
+    /// The module `fuzz_ambient`.
+    pub const FUZZ_AMBIENT: &str = include_str!("../glsl_es_300/fuzz_ambient.glsl");
+
+    /// The module `fuzz_deferred`.
+    pub const FUZZ_DEFERRED: &str = include_str!("../glsl_es_300/fuzz_deferred.glsl");
+
     /// The module `multiscatter`.
     pub const MULTISCATTER: &str = include_str!("../glsl_es_300/multiscatter.glsl");
 
@@ -241,6 +328,9 @@ pub mod glsl_es_300 {
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../glsl_es_300/ggx.glsl");
 
+    /// The module `fuzz_sampling`.
+    pub const FUZZ_SAMPLING: &str = include_str!("../glsl_es_300/fuzz_sampling.glsl");
+
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../glsl_es_300/sggx.glsl");
 
@@ -255,12 +345,18 @@ pub mod glsl_es_300 {
         Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
         Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "fuzz_p_s", text: FUZZ_P_S, needs: &[] },
+        Module { name: "fuzz_phase", text: FUZZ_PHASE, needs: &[] },
+        Module { name: "fuzz_layer", text: FUZZ_LAYER, needs: &["fuzz_phase"] },
+        Module { name: "fuzz_ambient", text: FUZZ_AMBIENT, needs: &["fuzz_layer"] },
+        Module { name: "fuzz_deferred", text: FUZZ_DEFERRED, needs: &["fuzz_layer", "fuzz_phase"] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
         Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];
 }
@@ -290,6 +386,21 @@ pub mod hlsl {
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../hlsl/frame.hlsl");
 
+    /// The module `fuzz_p_s`.
+    pub const FUZZ_P_S: &str = include_str!("../hlsl/fuzz_p_s.hlsl");
+
+    /// The module `fuzz_phase`.
+    pub const FUZZ_PHASE: &str = include_str!("../hlsl/fuzz_phase.hlsl");
+
+    /// The module `fuzz_layer`.
+    pub const FUZZ_LAYER: &str = include_str!("../hlsl/fuzz_layer.hlsl");
+
+    /// The module `fuzz_ambient`.
+    pub const FUZZ_AMBIENT: &str = include_str!("../hlsl/fuzz_ambient.hlsl");
+
+    /// The module `fuzz_deferred`.
+    pub const FUZZ_DEFERRED: &str = include_str!("../hlsl/fuzz_deferred.hlsl");
+
     /// The module `multiscatter`.
     pub const MULTISCATTER: &str = include_str!("../hlsl/multiscatter.hlsl");
 
@@ -308,6 +419,9 @@ pub mod hlsl {
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../hlsl/ggx.hlsl");
 
+    /// The module `fuzz_sampling`.
+    pub const FUZZ_SAMPLING: &str = include_str!("../hlsl/fuzz_sampling.hlsl");
+
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../hlsl/sggx.hlsl");
 
@@ -322,12 +436,18 @@ pub mod hlsl {
         Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
         Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "fuzz_p_s", text: FUZZ_P_S, needs: &[] },
+        Module { name: "fuzz_phase", text: FUZZ_PHASE, needs: &[] },
+        Module { name: "fuzz_layer", text: FUZZ_LAYER, needs: &["fuzz_phase"] },
+        Module { name: "fuzz_ambient", text: FUZZ_AMBIENT, needs: &["fuzz_layer"] },
+        Module { name: "fuzz_deferred", text: FUZZ_DEFERRED, needs: &["fuzz_layer", "fuzz_phase"] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
         Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];
 }
@@ -357,6 +477,21 @@ pub mod msl {
     /// The module `frame`.
     pub const FRAME: &str = include_str!("../msl/frame.h");
 
+    /// The module `fuzz_p_s`.
+    pub const FUZZ_P_S: &str = include_str!("../msl/fuzz_p_s.h");
+
+    /// The module `fuzz_phase`.
+    pub const FUZZ_PHASE: &str = include_str!("../msl/fuzz_phase.h");
+
+    /// The module `fuzz_layer`.
+    pub const FUZZ_LAYER: &str = include_str!("../msl/fuzz_layer.h");
+
+    /// The module `fuzz_ambient`.
+    pub const FUZZ_AMBIENT: &str = include_str!("../msl/fuzz_ambient.h");
+
+    /// The module `fuzz_deferred`.
+    pub const FUZZ_DEFERRED: &str = include_str!("../msl/fuzz_deferred.h");
+
     /// The module `multiscatter`.
     pub const MULTISCATTER: &str = include_str!("../msl/multiscatter.h");
 
@@ -375,6 +510,9 @@ pub mod msl {
     /// The module `ggx`.
     pub const GGX: &str = include_str!("../msl/ggx.h");
 
+    /// The module `fuzz_sampling`.
+    pub const FUZZ_SAMPLING: &str = include_str!("../msl/fuzz_sampling.h");
+
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../msl/sggx.h");
 
@@ -389,12 +527,18 @@ pub mod msl {
         Module { name: "detail_over", text: DETAIL_OVER, needs: &[] },
         Module { name: "detail_overlay", text: DETAIL_OVERLAY, needs: &[] },
         Module { name: "frame", text: FRAME, needs: &[] },
+        Module { name: "fuzz_p_s", text: FUZZ_P_S, needs: &[] },
+        Module { name: "fuzz_phase", text: FUZZ_PHASE, needs: &[] },
+        Module { name: "fuzz_layer", text: FUZZ_LAYER, needs: &["fuzz_phase"] },
+        Module { name: "fuzz_ambient", text: FUZZ_AMBIENT, needs: &["fuzz_layer"] },
+        Module { name: "fuzz_deferred", text: FUZZ_DEFERRED, needs: &["fuzz_layer", "fuzz_phase"] },
         Module { name: "multiscatter", text: MULTISCATTER, needs: &[] },
         Module { name: "sh", text: SH, needs: &[] },
         Module { name: "sym", text: SYM, needs: &[] },
         Module { name: "aniso", text: ANISO, needs: &["frame", "sym"] },
         Module { name: "detail_layer", text: DETAIL_LAYER, needs: &["aniso"] },
         Module { name: "ggx", text: GGX, needs: &["sym"] },
+        Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
     ];
 }

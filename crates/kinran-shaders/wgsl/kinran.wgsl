@@ -190,6 +190,454 @@ fn normal_from_xy(x: f32, y: f32) -> vec3f {
 
 // Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
 // Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_p_s.wesl, by ./x shaders. Needs: nothing else
+
+// P_s: the share of scattered light that a fibre sends down to the base.
+//
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+
+/// A step of Laguerre's iteration for the largest root of `l³ + square l² + linear l + constant`, whose roots are all
+/// real.
+///
+/// Cost on GCN: 18 instructions (2 at a quarter of the rate).
+fn fibre_p_s_step(l: f32, constant: f32, linear: f32, square: f32) -> f32 {
+    let value = ((l + square) * l + linear) * l + constant;
+    let slope = (3.0 * l + 2.0 * square) * l + linear;
+    let bend = 6.0 * l + 2.0 * square;
+    let root = sqrt(max(4.0 * slope * slope - 6.0 * value * bend, 0.0));
+    return l - 3.0 * value / max(slope + root, 1e-20);
+}
+
+/// P_s of SGGX fibres, exactly (slide: Base Layer, "no analytical expression"): one minus the integral of
+/// `fibre_phase(u, v)` over the `v` above the horizon, for a light at cosines `n_u` ≥ 0 to the normal and `t_u` to the
+/// fibres, whose own cosine to the normal is `t_n`. It is the form factor of an elliptic cone: with the positive root λ
+/// of `χ = λ³ + (α² c + 2 k t_u t_n) λ² - (α² + k (1 - t_u² - t_n²)) λ - α² c`, `c = n_u`, `k = 1 - α²`,
+/// `1 - P_s = λ sqrt((λ + c) (λ + α² c/σ²)) / χ'(λ)`. Laguerre's iteration from 1 falls on λ.
+///
+/// Cost on GCN: 91 instructions (11 at a quarter of the rate).
+fn fibre_p_s(n_u: f32, t_u: f32, t_n: f32, alpha: f32) -> f32 {
+    let alpha_sqr = alpha * alpha;
+    let k = 1.0 - alpha_sqr;
+    let constant = -alpha_sqr * n_u;
+    let linear = -(alpha_sqr + k * (1.0 - t_u * t_u - t_n * t_n));
+    let square = alpha_sqr * n_u + 2.0 * k * t_u * t_n;
+
+    // Four steps cube the error four times.
+    let first = fibre_p_s_step(1.0, constant, linear, square);
+    let second = fibre_p_s_step(first, constant, linear, square);
+    let third = fibre_p_s_step(second, constant, linear, square);
+    let l = fibre_p_s_step(third, constant, linear, square);
+    let slope = (3.0 * l + 2.0 * square) * l + linear;
+    let area_sqr = 1.0 - k * t_u * t_u;
+    let upward = l * sqrt((l + n_u) * (l + alpha_sqr * n_u / area_sqr)) / max(slope, 1e-20);
+    return saturate(1.0 - upward);
+}
+
+/// P_s by the talk's six coefficients (slide: Base Layer), fitted for one tilt and one spread: `c_0 + c_1 n_u + c_2 t_u +
+/// c_3 n_u² + c_4 n_u t_u + c_5 t_u²`, clamped to [0, 1]. `kinran fit fuzz` prints them with their error.
+///
+/// Cost on GCN: 5 instructions.
+fn fuzz_p_s(coefficients: array<f32, 6>, n_u: f32, t_u: f32) -> f32 {
+    let across = n_u * (coefficients[1] + coefficients[3] * n_u + coefficients[4] * t_u);
+    return saturate(coefficients[0] + across + t_u * (coefficients[2] + coefficients[5] * t_u));
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_phase.wesl, by ./x shaders. Needs: nothing else
+
+// How a fibre scatters: the SGGX phase function of specular fibres, and Schlick's for velvet.
+//
+// Heitz, Dupuy, Crassin, Dachsbacher. The SGGX Microflake Distribution. SIGGRAPH 2015.
+// Schlick. An Inexpensive BRDF Model for Physically-based Rendering. Eurographics 1994.
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+
+/// Smallest roughness of fibres to shade with.
+const FUZZ_ALPHA_MIN: f32 = 0.1;
+
+/// Roughness of fibres from their spread, 0 (combed) to 1 (in all directions): its root, at least FUZZ_ALPHA_MIN.
+///
+/// Cost on GCN: 2 instructions (1 at a quarter of the rate).
+fn fuzz_alpha(spread: f32) -> f32 {
+    return sqrt(max(spread, FUZZ_ALPHA_MIN * FUZZ_ALPHA_MIN));
+}
+
+/// Schlick's k of the velvet phase from the fibres' spread: `1 - spread`, at most 0.99.
+///
+/// Cost on GCN: 2 instructions.
+fn velvet_k(spread: f32) -> f32 {
+    return 1.0 - max(spread, FUZZ_ALPHA_MIN * FUZZ_ALPHA_MIN);
+}
+
+/// Direction of fibres in a frame with z along the normal: `tilt` away from the normal (0 upright, π/2 lying),
+/// `azimuth` counter-clockwise from x, both in radians.
+///
+/// Cost on GCN: 10 instructions (4 at a quarter of the rate).
+fn fibre_direction(tilt: f32, azimuth: f32) -> vec3f {
+    let sine = sin(tilt);
+    return vec3f(sine * cos(azimuth), sine * sin(azimuth), cos(tilt));
+}
+
+/// Distribution of the fibres' microflake normals at cosine `t_h` to their direction, per steradian over the sphere
+/// (slide: Phase Function, `D_F`): `α³ / (π (t_h² (1 - α²) + α²)²)`.
+///
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
+fn fibre_d(t_h: f32, alpha: f32) -> f32 {
+    let alpha_sqr = alpha * alpha;
+    let q = t_h * t_h * (1.0 - alpha_sqr) + alpha_sqr;
+    return alpha_sqr * alpha / (3.14159265 * q * q);
+}
+
+/// Projected area of the fibres' microflakes along a direction at cosine `t_w` to them (slide: Phase Function, `σ_F`):
+/// `sqrt(1 - t_w² (1 - α²))`.
+///
+/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
+fn fibre_projected_area(t_w: f32, alpha: f32) -> f32 {
+    return sqrt(1.0 - t_w * t_w * (1.0 - alpha * alpha));
+}
+
+/// The fibres' phase function per steradian (slide: Phase Function, `p_F`): `D_F(h) / (4 σ_F(u))` for light from `u`
+/// and a view along `v`, from `u_v = u·v`, `t_u = t·u` and `t_v = t·v`. Not symmetric.
+///
+/// Cost on GCN: 18 instructions (2 at a quarter of the rate).
+fn fibre_phase(u_v: f32, t_u: f32, t_v: f32, alpha: f32) -> f32 {
+    // |u + v|², kept above zero where v = -u.
+    let w = 2.000002 + 2.0 * u_v;
+    let s = t_u + t_v;
+    let alpha_sqr = alpha * alpha;
+    let k = 1.0 - alpha_sqr;
+    let m = s * s * k + alpha_sqr * w;
+    return alpha_sqr * alpha * w * w * inverseSqrt(1.0 - t_u * t_u * k) / (12.5663706 * m * m);
+}
+
+/// Normalisation r(k) of the velvet phase: `sqrt(1-k) / (1 + (2 sqrt(2) - 1) k)`, for k in [0, 0.99]. With it the phase
+/// scatters at most what arrives, and 0.88 of it at least for light across the fibres.
+///
+/// Cost on GCN: 5 instructions (2 at a quarter of the rate).
+fn velvet_normalization(k: f32) -> f32 {
+    return sqrt(1.0 - k) / (1.0 + 1.82842712 * k);
+}
+
+/// The velvet phase per steradian (slide: Velvet Scattering, `p_V`): `r(k) (1-k²) / (4π (1 - k sin(t, h))²)`, arguments
+/// as in `fibre_phase`, k in [0, 0.99] as `velvet_k` gives it. The slide's k has the other sign, which scatters forward.
+///
+/// Cost on GCN: 19 instructions (5 at a quarter of the rate).
+fn velvet_phase(u_v: f32, t_u: f32, t_v: f32, k: f32) -> f32 {
+    let w = 2.000002 + 2.0 * u_v;
+    let s = t_u + t_v;
+    let q = 1.0 - k * sqrt(max(1.0 - s * s / w, 0.0));
+    return velvet_normalization(k) * (1.0 - k * k) / (12.5663706 * q * q);
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_layer.wesl, by ./x shaders. Needs: fuzz_phase
+
+// The layer of fibres: what it scatters to the viewer and what it leaves of the base.
+//
+// Koenderink, Pont. The Secret of Velvety Skin. Machine Vision and Applications 2003.
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+
+/// Share of light that passes the layer along a direction at cosine `n_w` to the normal without meeting a fibre:
+/// `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
+///
+/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
+fn fuzz_passage(density: f32, n_w: f32) -> f32 {
+    return exp2(-1.44269504 * density / n_w);
+}
+
+/// The layer's BRDF for a fibre albedo of one (slide: New Model): `p (1 - passed) / (n_u + n_v)`, where `passed` is
+/// `fuzz_passage` along the light times that along the view, and `phase` the phase function. Cosines must be positive.
+///
+/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
+fn fuzz_layer(phase: f32, passed: f32, n_u: f32, n_v: f32) -> f32 {
+    return phase * (1.0 - passed) / (n_u + n_v);
+}
+
+/// BRDF of a layer of SGGX fibres for an albedo of one, per steradian, zero below the horizon; `u` light, `v` view and
+/// `t` fibre direction are unit vectors in a frame with z along the normal. Not reciprocal: `f(u, v) σ(u) = f(v, u)
+/// σ(v)`.
+///
+/// Cost on GCN: 41 instructions (6 at a quarter of the rate).
+fn fuzz_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, alpha: f32) -> f32 {
+    let passed = fuzz_passage(density, u.z) * fuzz_passage(density, v.z);
+    let value = fuzz_layer(fibre_phase(dot(u, v), dot(t, u), dot(t, v), alpha), passed, u.z, v.z);
+    return select(0.0, value, min(u.z, v.z) > 0.0);
+}
+
+/// `fuzz_brdf` with the velvet phase of asymmetry `k`; reciprocal.
+///
+/// Cost on GCN: 42 instructions (9 at a quarter of the rate).
+fn fuzz_velvet_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, k: f32) -> f32 {
+    let passed = fuzz_passage(density, u.z) * fuzz_passage(density, v.z);
+    let value = fuzz_layer(velvet_phase(dot(u, v), dot(t, u), dot(t, v), k), passed, u.z, v.z);
+    return select(0.0, value, min(u.z, v.z) > 0.0);
+}
+
+/// BRDF of a layer whose extinction follows the fibres' projected area, as in a true microflake volume:
+/// `D/4 (1 - e^(-d (σ_u/n_u + σ_v/n_v))) / (σ_v n_u + σ_u n_v)`. Reciprocal.
+///
+/// Cost on GCN: 52 instructions (8 at a quarter of the rate).
+fn fuzz_reciprocal_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, alpha: f32) -> f32 {
+    let h = normalize(u + v);
+    let area_u = fibre_projected_area(dot(t, u), alpha);
+    let area_v = fibre_projected_area(dot(t, v), alpha);
+    let passed = fuzz_passage(density * area_u, u.z) * fuzz_passage(density * area_v, v.z);
+    let value = 0.25 * fibre_d(dot(t, h), alpha) * (1.0 - passed) / (area_v * u.z + area_u * v.z);
+    return select(0.0, value, min(u.z, v.z) > 0.0);
+}
+
+/// What the layer's lobe needs of a view, once a pixel.
+struct FuzzView {
+    /// Cosine of view and normal.
+    n_v: f32,
+    /// Cosine of view and fibre.
+    t_v: f32,
+    /// `P_e`: the share of the base's light that reaches the viewer.
+    escaped: f32,
+    /// `-d log2(e)`.
+    exponent: f32,
+    /// `α²`.
+    alpha_sqr: f32,
+    /// `α³ / 4π`.
+    scale: f32,
+}
+
+/// What the layer makes of a light.
+struct FuzzLight {
+    /// The BRDF for a fibre albedo of one, per steradian.
+    lobe: f32,
+    /// `P_p`: the share of the light that reaches the base unscattered.
+    penetrated: f32,
+}
+
+/// Prepares `fuzz_light` for a view at cosine `n_v` > 0 to the normal and `t_v` to the fibres.
+///
+/// Cost on GCN: 7 instructions (2 at a quarter of the rate).
+fn fuzz_view(n_v: f32, t_v: f32, density: f32, alpha: f32) -> FuzzView {
+    let exponent = -1.44269504 * density;
+    let alpha_sqr = alpha * alpha;
+    return FuzzView(n_v, t_v, exp2(exponent / n_v), exponent, alpha_sqr, alpha_sqr * alpha * 0.0795774715);
+}
+
+/// Lobe and penetration for a light at cosines `n_u` > 0 to the normal, `t_u` to the fibres and `u_v` to the view:
+/// `fuzz_brdf` with one exponential for both. The cosines are the same in every frame.
+///
+/// Cost on GCN: 22 instructions (4 at a quarter of the rate).
+fn fuzz_light(view: FuzzView, n_u: f32, t_u: f32, u_v: f32) -> FuzzLight {
+    let penetrated = exp2(view.exponent / n_u);
+    // |u + v|², kept above zero where v = -u.
+    let w = 2.000002 + 2.0 * u_v;
+    let s = t_u + view.t_v;
+    let k = 1.0 - view.alpha_sqr;
+    let m = s * s * k + view.alpha_sqr * w;
+    let scattered = 1.0 - penetrated * view.escaped;
+    let lobe = view.scale * scattered * w * w * inverseSqrt(1.0 - t_u * t_u * k) / (m * m * (n_u + view.n_v));
+    return FuzzLight(lobe, penetrated);
+}
+
+/// Factor on the base's BRDF (slide: Base Layer, `c_atten`): `(P_p + c_f (1 - P_p) P_s) P_e`, for the share `penetrated`
+/// that reaches the base, `escaped` that leaves it towards the viewer, and `downward` (P_s) of the scattered light that
+/// goes down. With `downward` = 0 it is the talk's cheaper variant.
+///
+/// Cost on GCN: 8 instructions.
+fn fuzz_attenuation(penetrated: f32, escaped: f32, downward: f32, fibre_color: vec3f) -> vec3f {
+    // `escaped` goes with what the compiler can keep for all lights.
+    let scattered = downward - penetrated * downward;
+    return penetrated * escaped + fibre_color * escaped * scattered;
+}
+
+/// The normal for the layer, between the normal-mapped `n` and the mesh's `vertex_normal` (slide: Deferred):
+/// `smoothness` 0 keeps `n`, 1 takes the mesh's.
+///
+/// Cost on GCN: 13 instructions (1 at a quarter of the rate).
+fn fuzz_smooth_normal(n: vec3f, vertex_normal: vec3f, smoothness: f32) -> vec3f {
+    return normalize(n + (vertex_normal - n) * smoothness);
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_ambient.wesl, by ./x shaders. Needs: fuzz_layer
+
+// The layer of fibres in light from all around, given as order-2 spherical harmonics.
+//
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+//
+// Ambient light of the layer is `c_f fuzz_g fuzz_ambient_factor fuzz_ambient_radiance`: the mean of the layer's
+// geometry, a polynomial for what the phase function gathers, and the light along the lobe's mean direction. The talk
+// has `1 - P_s(v)` for the second and the hemisphere's mean for the third.
+
+/// Mean over the hemisphere of the layer's BRDF times cosine over phase (slide: Ambient Lighting, `G~`), for a view at
+/// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
+/// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002.
+///
+/// Cost on GCN: 15 instructions (4 at a quarter of the rate).
+fn fuzz_g(density: f32, n_v: f32) -> f32 {
+    let dense = 1.0 - n_v * log(1.0 + 1.0 / n_v);
+    let y = density / (n_v * dense);
+    let e = exp2(-1.44269504 * y);
+    return dense * (1.0 - e) * (1.0 - 0.1 * y * e);
+}
+
+/// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients.
+///
+/// Cost on GCN: 8 instructions (1 at a quarter of the rate).
+fn fuzz_g_talk(coefficients: array<f32, 4>, density: f32, n_v: f32) -> f32 {
+    let above = 1.0 + n_v * (coefficients[0] + coefficients[1] * n_v);
+    return density * above / (density + n_v * (coefficients[2] + coefficients[3] * n_v * n_v));
+}
+
+/// Share of uniform irradiance that reaches the base unscattered, `2 E_3(d)` (slide: Ambient Shadowing, `Q~`); within
+/// 0.00043 for densities in [0, 3].
+///
+/// Cost on GCN: 11 instructions (2 at a quarter of the rate).
+fn fuzz_q(density: f32) -> f32 {
+    let above = 1.0 + density * (3.07323 + 0.102541 * density);
+    return fuzz_passage(density, 1.0) * above / (1.0 + density * (4.02006 + 1.98275 * density));
+}
+
+/// The talk's form of `fuzz_q`, `1 + c_0 d + c_1 d²`, by two coefficients; turns up outside the range of its fit.
+///
+/// Cost on GCN: 2 instructions.
+fn fuzz_q_talk(coefficients: array<f32, 2>, density: f32) -> f32 {
+    return 1.0 + density * (coefficients[0] + coefficients[1] * density);
+}
+
+/// What the phase function gathers of uniform light, over `fuzz_g`, as a polynomial of the view fitted for one tilt and
+/// one spread over densities of 0.05 to 0.5: the talk's six terms and the third and fourth power of `t_v`.
+///
+/// Cost on GCN: 8 instructions.
+fn fuzz_ambient_factor(coefficients: array<f32, 8>, n_v: f32, t_v: f32) -> f32 {
+    let along = t_v * (coefficients[2] + t_v * (coefficients[5] + t_v * (coefficients[6] + t_v * coefficients[7])));
+    let across = n_v * (coefficients[1] + coefficients[3] * n_v + coefficients[4] * t_v);
+    return max(coefficients[0] + across + along, 0.0);
+}
+
+/// Where the table that replaces `fuzz_ambient_factor` for combed fibres is read, each in [0, 1]: x is `n_v`, y runs
+/// with the cosine of the azimuth between view and fibre. `t_n` is `t·n`.
+///
+/// Cost on GCN: 7 instructions (1 at a quarter of the rate).
+fn fuzz_ambient_place(n_v: f32, t_v: f32, t_n: f32) -> vec2f {
+    let sines = sqrt(max((1.0 - n_v * n_v) * (1.0 - t_n * t_n), 1e-12));
+    return vec2f(n_v, saturate(0.5 + 0.5 * (t_v - n_v * t_n) / sines));
+}
+
+/// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a
+/// dense one adds to it.
+///
+/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
+fn fuzz_ambient_tabulated(texel: vec2f, density: f32, n_v: f32) -> f32 {
+    return texel.x + texel.y * density / (density + n_v);
+}
+
+/// Mean direction of the light that the lobe gathers, shorter than one, by four coefficients of the same fit:
+/// `c_0 n + c_1 v + (c_2 + c_3 t_v) t`.
+///
+/// Cost on GCN: 13 instructions.
+fn fuzz_ambient_direction(coefficients: array<f32, 4>, n: vec3f, v: vec3f, t: vec3f) -> vec3f {
+    return n * coefficients[0] + v * coefficients[1] + t * (coefficients[2] + coefficients[3] * dot(t, v));
+}
+
+/// Mean radiance in the lobe, from the coefficients of `radiance` up to order 1 and `fuzz_ambient_direction`; exact for
+/// light that varies linearly with direction. Never negative.
+///
+/// Cost on GCN: 18 instructions.
+fn fuzz_ambient_radiance(radiance: array<vec3f, 9>, direction: vec3f) -> vec3f {
+    let linear = radiance[3] * direction.x + radiance[1] * direction.y + radiance[2] * direction.z;
+    return max(radiance[0] * 0.2820948 + linear * 0.48860252, vec3f(0.0));
+}
+
+/// Mean radiance over the hemisphere about the unit vector `n`: the talk's light. Never negative.
+///
+/// Cost on GCN: 21 instructions.
+fn fuzz_ambient_mean(radiance: array<vec3f, 9>, n: vec3f) -> vec3f {
+    return fuzz_ambient_radiance(radiance, n * 0.5);
+}
+
+/// Factor on the base's ambient light, diffuse or from a specular probe (slide: Ambient Shadowing, `c_atten`):
+/// `P_e (Q + c_f R (1 - Q))`. `downward` is R, the mean of P_s over uniform irradiance, which depends on tilt and spread;
+/// 1/2 for fibres in all directions. The slide's R lacks a 1/π.
+///
+/// Cost on GCN: 8 instructions.
+fn fuzz_ambient_attenuation(escaped: f32, q: f32, downward: f32, fibre_color: vec3f) -> vec3f {
+    return (q + fibre_color * (downward * (1.0 - q))) * escaped;
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_deferred.wesl, by ./x shaders. Needs: fuzz_layer, fuzz_phase
+
+// Fuzz by seven bits of a G-buffer: fixed fibres over Lambert, for moss and felt.
+//
+// McAuley. Extension to Energy-Conserving Wrapped Diffuse. 2013.
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+
+/// Density of the layer.
+const FUZZ_DEFERRED_DENSITY: f32 = 0.5;
+
+/// Roughness of the fibres: a spread of 0.9. They stand along the normal.
+const FUZZ_DEFERRED_ALPHA: f32 = 0.9486833;
+
+/// Albedo of the fibres over that of the Lambert base.
+const FUZZ_DEFERRED_ALBEDO: f32 = 5.0;
+
+/// How far light wraps around the terminator, as a cosine.
+const FUZZ_WRAP: f32 = 0.2;
+
+/// The cosine of light and normal, softened by wrapping (McAuley 2013; slide: Deferred), n = 2:
+/// `(1+n)/(2(1+w)) (max(n_u + w, 0)/(1+w))^n`. Its integral over the sphere is π. Where no light arrives it is 1e-8
+/// rather than zero, so that the layer may divide by it.
+///
+/// Cost on GCN: 4 instructions.
+fn fuzz_wrap(n_u: f32) -> f32 {
+    let scale = 3.0 / (2.0 * (1.0 + FUZZ_WRAP) * (1.0 + FUZZ_WRAP) * (1.0 + FUZZ_WRAP));
+    let c = max(n_u + FUZZ_WRAP, 1e-4);
+    return scale * c * c;
+}
+
+/// P_e of the deferred layer, once a pixel.
+///
+/// Cost on GCN: 3 instructions (2 at a quarter of the rate).
+fn fuzz_deferred_escape(n_v: f32) -> f32 {
+    return fuzz_passage(FUZZ_DEFERRED_DENSITY, n_v);
+}
+
+/// BRDF times cosine of the deferred layer for a fibre albedo of one, from the cosines of light and view with the normal
+/// and with each other and `fuzz_deferred_escape`. Lights down to `n_u = -FUZZ_WRAP` reach it. The picture is
+/// `lerp(Lambert, this, fuzziness)`; the base is not shadowed.
+///
+/// Cost on GCN: 28 instructions (5 at a quarter of the rate).
+fn fuzz_deferred(n_u: f32, n_v: f32, u_v: f32, escaped: f32) -> f32 {
+    let wrapped = fuzz_wrap(n_u);
+    let passed = fuzz_passage(FUZZ_DEFERRED_DENSITY, wrapped) * escaped;
+    return fibre_phase(u_v, n_u, n_v, FUZZ_DEFERRED_ALPHA) * (1.0 - passed) * wrapped / (wrapped + n_v);
+}
+
+/// Albedo of the fibres over a Lambert base of albedo `base`: `5 base`, as the talk has it, but no more than the layer
+/// can have without returning more than arrives. The talk's alone exceeds one at grazing where `base` is above 0.35.
+///
+/// Cost on GCN: 8 instructions.
+fn fuzz_deferred_color(base: vec3f, n_v: f32) -> vec3f {
+    return min(base * FUZZ_DEFERRED_ALBEDO, vec3f(1.7241 + 7.5257 * n_v));
+}
+
+/// Eight bits of a G-buffer, a whole number from 0 to 255, from a fuzziness in [0, 1], rounded to 1/127, below a `flag` in
+/// the top bit (0 or 1: translucency, in the talk). A channel of the format unorm8 wants it over 255.
+///
+/// Cost on GCN: 4 instructions.
+fn fuzziness_code(fuzziness: f32, flag: f32) -> f32 {
+    return 128.0 * flag + floor(saturate(fuzziness) * 127.0 + 0.5);
+}
+
+/// Fuzziness of eight bits, the flag left out. What a channel of the format unorm8 gives, times 255, need not be whole.
+///
+/// Cost on GCN: 4 instructions.
+fn fuzziness_from_code(code: f32) -> f32 {
+    return (code - select(0.0, 128.0, code > 127.5)) * (1.0 / 127.0);
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
 // Made from src/multiscatter.wesl, by ./x shaders. Needs: nothing else
 
 // Energy that microfacet models lose between the facets, given back.
@@ -770,6 +1218,96 @@ fn ggx_vndf_pdf(v: vec3f, h: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
     }
     let g_over_n_v = 2.0 / (v.z + length(v * vec3f(alpha_t, alpha_b, 1.0)));
     return g_over_n_v * max(dot(v, h), 0.0) * ggx_aniso_d(h, alpha_t, alpha_b);
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_sampling.wesl, by ./x shaders. Needs: fuzz_phase, ggx
+
+// Light directions for a view, where a layer of fibres and its base scatter from.
+//
+// Heitz, Dupuy, Crassin, Dachsbacher. The SGGX Microflake Distribution. SIGGRAPH 2015.
+
+/// A light direction distributed as `fuzz_pdf` for the view `v`, from two uniform numbers in [0, 1): `v` reflected on a
+/// visible normal of the fibres (Heitz 2015, section 4). It may lie below the horizon, where the layer receives nothing:
+/// the density covers the sphere.
+///
+/// Cost on GCN: 58 instructions (6 at a quarter of the rate).
+fn fuzz_sample(v: vec3f, t: vec3f, alpha: f32, xi: vec2f) -> vec3f {
+    let squeezed_v = v - t * ((1.0 - alpha) * dot(t, v));
+    let phi = 6.28318531 * xi.x;
+    let z = 1.0 - 2.0 * xi.y;
+    let r = sqrt(max(1.0 - z * z, 0.0));
+    let axis = normalize(squeezed_v);
+    let sum = vec3f(r * cos(phi), r * sin(phi), z) + axis;
+    // The point opposite to the axis is no direction.
+    let m = normalize(select(axis, sum, dot(sum, sum) > 1e-12));
+    let h = normalize(m - t * ((1.0 - alpha) * dot(t, m)));
+    return h * (2.0 * dot(v, h)) - v;
+}
+
+/// Density per steradian of `fuzz_sample`: `D_F(h) / (4 σ_F(v))`.
+///
+/// Cost on GCN: 27 instructions (2 at a quarter of the rate).
+fn fuzz_pdf(u: vec3f, v: vec3f, t: vec3f, alpha: f32) -> f32 {
+    return fibre_phase(dot(u, v), dot(t, v), dot(t, u), alpha);
+}
+
+/// Probabilities of sampling the layer, the base's specular lobe and its diffuse one, in proportion to the light that
+/// each is expected to send; each at least 5 % of the largest, so that a wrong guess only adds noise.
+///
+/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
+fn fuzz_over_base_shares(fuzz: f32, specular: f32, diffuse: f32) -> vec3f {
+    let least = 0.05 * max(max(fuzz, max(specular, diffuse)), 1e-6);
+    let shares = max(vec3f(fuzz, specular, diffuse), vec3f(least));
+    return shares / (shares.x + shares.y + shares.z);
+}
+
+/// A light direction for a layer of fibres over GGX and Lambert, distributed as `fuzz_over_base_pdf`; vectors in the
+/// frame of the alphas, z along the normal, `shares` as `fuzz_over_base_shares` gives them.
+///
+/// Cost on GCN: 118 instructions (18 at a quarter of the rate).
+fn fuzz_over_base_sample(
+    v: vec3f,
+    t: vec3f,
+    alpha: f32,
+    alpha_t: f32,
+    alpha_b: f32,
+    shares: vec3f,
+    xi: vec2f,
+) -> vec3f {
+    if xi.x < shares.x {
+        return fuzz_sample(v, t, alpha, vec2f(xi.x / shares.x, xi.y));
+    }
+    let rest = xi.x - shares.x;
+    if rest < shares.y {
+        let h = ggx_vndf_sample(v, alpha_t, alpha_b, vec2f(rest / shares.y, xi.y));
+        return h * (2.0 * dot(v, h)) - v;
+    }
+    // Rounding may take the last number to one.
+    let x = saturate((rest - shares.y) / shares.z);
+    let phi = 6.28318531 * xi.y;
+    let r = sqrt(x);
+    return vec3f(r * cos(phi), r * sin(phi), sqrt(1.0 - x));
+}
+
+/// Density per steradian of `fuzz_over_base_sample`, over the sphere.
+///
+/// Cost on GCN: 84 instructions (7 at a quarter of the rate).
+fn fuzz_over_base_pdf(
+    u: vec3f,
+    v: vec3f,
+    t: vec3f,
+    alpha: f32,
+    alpha_t: f32,
+    alpha_b: f32,
+    shares: vec3f,
+) -> f32 {
+    let sum = u + v;
+    let h = normalize(select(t, sum, dot(sum, sum) > 1e-12));
+    let specular = ggx_vndf_pdf(v, h, alpha_t, alpha_b) / max(4.0 * dot(v, h), 1e-12);
+    let diffuse = max(u.z, 0.0) * 0.318309886;
+    return shares.x * fuzz_pdf(u, v, t, alpha) + shares.y * specular + shares.z * diffuse;
 }
 
 // Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0

@@ -12,6 +12,7 @@ mod aniso;
 mod beckmann;
 pub mod detail;
 mod frame;
+pub mod fuzz;
 mod ggx;
 mod multiscatter;
 mod sggx;

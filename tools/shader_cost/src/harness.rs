@@ -13,8 +13,11 @@ pub(crate) struct Row {
     /// Its name for people.
     pub(crate) title: &'static str,
     setup: String,
-    specular: &'static str,
-    ambient: &'static str,
+    /// Statements for a light `u` at cosine `n_u`.
+    light: String,
+    /// BRDF times cosine for that light.
+    reflected: &'static str,
+    ambient: String,
 }
 
 /// A row for each lobe. Set-up is counted over that of the first, Lambert alone.
@@ -71,14 +74,15 @@ pub(crate) fn rows() -> Vec<Row> {
     let harmonics = "
     color += pixel.base * max(sh_evaluate(scene.irradiance, n), vec3f(0.0));";
 
-    let row = |id, title, setup: &[&str], specular, ambient| Row {
+    let row = |id, title, setup: &[&str], specular: &str, ambient: &str| Row {
         id,
         title,
         setup: setup.concat(),
-        specular,
-        ambient,
+        light: specular.to_owned(),
+        reflected: if specular.is_empty() { "n_u * pixel.base" } else { "n_u * (pixel.base + specular)" },
+        ambient: ambient.to_owned(),
     };
-    vec![
+    let mut rows = vec![
         row("lambert", "Lambert alone", &[], "", ""),
         row("ggx", "isotropic GGX", &[isotropic_setup], isotropic, ""),
         row("ggx_aniso", "anisotropic GGX, alphas given", &[view, given, local_v], anisotropic, ""),
@@ -98,20 +102,152 @@ pub(crate) fn rows() -> Vec<Row> {
             "",
         ),
         row("sh", "Lambert with ambient light from spherical harmonics", &[], "", harmonics),
-    ]
+    ];
+
+    // Fuzz. The fibres' direction is a texel brought to world space; coefficients are the material's.
+    let fibres = "
+    let fibre = normalize(pixel.fibre);
+    let fuzz = fuzz_view(max(dot(n, v), 1e-4), dot(fibre, v), pixel.fuzz.x, pixel.fuzz.y);";
+    let scattered = "
+        let t_u = dot(fibre, u);
+        let layer = fuzz_light(fuzz, n_u, t_u, dot(u, v));";
+    let attenuated = "
+        let down = fuzz_p_s(coefficients, n_u, t_u);
+        let left = fuzz_attenuation(layer.penetrated, fuzz.escaped, down, pixel.fibre_color);";
+    // |u + v|² from u·v, which the layer needs too.
+    let anisotropic_under = "
+        let local_u = vec3f(dot(t, u), dot(b, u), n_u);
+        let u_v = dot(local_u, local_v);
+        let h = (local_u + local_v) * inverseSqrt(2.000002 + 2.0 * u_v);
+        let f = schlick_f(pixel.f0, saturate(dot(local_u, h)));
+        let d_v = ggx_aniso_d(h, alpha_t, alpha_b) * smith_aniso_v(local_u, local_v, alpha_t, alpha_b);
+        let specular = d_v * f;
+        let t_u = dot(fibre, u);
+        let layer = fuzz_light(fuzz, n_u, t_u, u_v);";
+    let exactly = "
+        let down = fibre_p_s(n_u, t_u, dot(fibre, n), pixel.fuzz.y);
+        let left = fuzz_attenuation(layer.penetrated, fuzz.escaped, down, pixel.fibre_color);";
+    let coefficients = "
+    let coefficients = array<f32, 6>(
+        scene.p_s[0].x, scene.p_s[0].y, scene.p_s[0].z, scene.p_s[0].w, scene.p_s[1].x, scene.p_s[1].y);";
+    let deferred = "
+    let n_v = max(dot(n, v), 1e-4);
+    let escaped = fuzz_deferred_escape(n_v);
+    let fuzz_color = pixel.base * FUZZ_DEFERRED_ALBEDO * pixel.fuzz.x;
+    let lambert = pixel.base * (1.0 - pixel.fuzz.x);";
+    let deferred_safe = "
+    let n_v = max(dot(n, v), 1e-4);
+    let escaped = fuzz_deferred_escape(n_v);
+    let fuzz_color = fuzz_deferred_color(pixel.base, n_v) * pixel.fuzz.x;
+    let lambert = pixel.base * (1.0 - pixel.fuzz.x);";
+    let soft = "
+        let layer = fuzz_deferred(dot(n, u), n_v, dot(u, v), escaped);";
+    let under = "
+    let under = fuzz_ambient_attenuation(fuzz.escaped, fuzz_q(pixel.fuzz.x), scene.p_s[1].z, pixel.fibre_color);
+    color += pixel.base * under * max(sh_evaluate(scene.irradiance, n), vec3f(0.0));";
+    let ambient_talk = "
+    let g_terms = array<f32, 4>(-0.6763, 0.0807, 0.8184, -0.4401);
+    let g = fuzz_g_talk(g_terms, pixel.fuzz.x, fuzz.n_v);
+    let up = 1.0 - fuzz_p_s(coefficients, fuzz.n_v, fuzz.t_v);
+    color += pixel.fibre_color * (g * up) * fuzz_ambient_mean(scene.radiance, n);";
+    let ambient_ours = "
+    let factor_terms = array<f32, 8>(
+        scene.ambient[0].x, scene.ambient[0].y, scene.ambient[0].z, scene.ambient[0].w,
+        scene.ambient[1].x, scene.ambient[1].y, scene.ambient[1].z, scene.ambient[1].w);
+    let direction_terms = array<f32, 4>(
+        scene.ambient[2].x, scene.ambient[2].y, scene.ambient[2].z, scene.ambient[2].w);
+    let gathered = fuzz_g(pixel.fuzz.x, fuzz.n_v) * fuzz_ambient_factor(factor_terms, fuzz.n_v, fuzz.t_v);
+    let towards = fuzz_ambient_direction(direction_terms, n, v, fibre);
+    color += pixel.fibre_color * gathered * fuzz_ambient_radiance(scene.radiance, towards);";
+    let fuzz_row = |id, title, setup: &[&str], light: &[&str], reflected, ambient: &[&str]| Row {
+        id,
+        title,
+        setup: setup.concat(),
+        light: light.concat(),
+        reflected,
+        ambient: ambient.concat(),
+    };
+    rows.extend([
+        fuzz_row(
+            "fuzz",
+            "**fuzz over Lambert**, base not attenuated",
+            &[view, fibres],
+            &[scattered],
+            "n_u * (pixel.base + pixel.fibre_color * layer.lobe)",
+            &[],
+        ),
+        fuzz_row(
+            "fuzz_attenuated",
+            "**fuzz over Lambert, attenuated** (P_p, P_e, P_s by six coefficients)",
+            &[view, fibres, coefficients],
+            &[scattered, attenuated],
+            "n_u * (pixel.base * left + pixel.fibre_color * layer.lobe)",
+            &[],
+        ),
+        fuzz_row(
+            "fuzz_exact",
+            "fuzz over Lambert, attenuated, P_s in closed form",
+            &[view, fibres],
+            &[scattered, exactly],
+            "n_u * (pixel.base * left + pixel.fibre_color * layer.lobe)",
+            &[],
+        ),
+        fuzz_row(
+            "aniso_fuzz",
+            "**aniso texel, decoded, under attenuated fuzz**",
+            &[view, decoded, local_v, fibres, coefficients],
+            &[anisotropic_under, attenuated],
+            "n_u * ((pixel.base + specular) * left + pixel.fibre_color * layer.lobe)",
+            &[],
+        ),
+        fuzz_row(
+            "fuzz_deferred",
+            "deferred fuzz",
+            &[view, deferred],
+            &[soft],
+            "(n_u * lambert + fuzz_color * layer)",
+            &[],
+        ),
+        fuzz_row(
+            "fuzz_deferred_safe",
+            "deferred fuzz that never exceeds one",
+            &[view, deferred_safe],
+            &[soft],
+            "(n_u * lambert + fuzz_color * layer)",
+            &[],
+        ),
+        fuzz_row(
+            "fuzz_ambient_talk",
+            "attenuated fuzz, ambient light as the talk has it",
+            &[view, fibres, coefficients],
+            &[scattered, attenuated],
+            "n_u * (pixel.base * left + pixel.fibre_color * layer.lobe)",
+            &[under, ambient_talk],
+        ),
+        fuzz_row(
+            "fuzz_ambient",
+            "attenuated fuzz, ambient light along the lobe",
+            &[view, fibres, coefficients],
+            &[scattered, attenuated],
+            "n_u * (pixel.base * left + pixel.fibre_color * layer.lobe)",
+            &[under, ambient_ours],
+        ),
+    ]);
+    rows
 }
 
 impl Row {
     /// The row under so many lights, unrolled.
     pub(crate) fn shader(&self, library: &str, lights: usize) -> String {
-        let Row { setup, specular, ambient, .. } = self;
-        let sum = if specular.is_empty() { "pixel.base" } else { "(pixel.base + specular)" };
+        let Row { setup, light: statements, reflected, ambient, .. } = self;
+        // The layer divides by it.
+        let least = if statements.contains("fuzz_light") { "1e-4" } else { "0.0" };
         let light = |i: usize| {
             format!(
                 "    {{
         let u = scene.lights[{i}].direction.xyz;
-        let n_u = max(dot(n, u), 0.0);{specular}
-        color += scene.lights[{i}].irradiance.xyz * n_u * {sum};
+        let n_u = max(dot(n, u), {least});{statements}
+        color += scene.lights[{i}].irradiance.xyz * {reflected};
     }}\n"
             )
         };
@@ -119,8 +255,15 @@ impl Row {
         format!(
             "{library}
 struct Light {{ direction: vec4f, irradiance: vec4f }}
-struct Scene {{ lights: array<Light, 8>, irradiance: array<vec3f, 9> }}
-struct Pixel {{ n: vec3f, v: vec3f, tangent: vec3f, bitangent: vec3f, texel: vec3f, f0: vec3f, base: vec3f, alphas: vec2f }}
+struct Scene {{
+    lights: array<Light, 8>,
+    irradiance: array<vec3f, 9>,
+    radiance: array<vec3f, 9>,
+    p_s: array<vec4f, 2>,
+    ambient: array<vec4f, 3>,
+}}
+struct Pixel {{ n: vec3f, v: vec3f, tangent: vec3f, bitangent: vec3f, texel: vec3f, f0: vec3f, base: vec3f, alphas: vec2f, fibre: vec3f,
+    fibre_color: vec3f, fuzz: vec2f }}
 @group(0) @binding(0) var<storage, read> pixels: array<Pixel>;
 @group(0) @binding(1) var<storage, read_write> colors: array<vec4f>;
 @group(0) @binding(2) var<uniform> scene: Scene;

@@ -1,6 +1,7 @@
 //! Which twin each shader function has, what to feed both, and how far they may differ.
 
 mod detail;
+mod fuzz;
 
 use fastrand::Rng;
 use glam::{Mat3, Vec2, Vec3, vec2, vec3};
@@ -540,5 +541,6 @@ pub(crate) fn cases() -> Vec<Case> {
         }),
     ]);
     cases.extend(detail::cases());
+    cases.extend(fuzz::cases());
     cases
 }

@@ -20,7 +20,8 @@ enum Shape {
     Vector(u32),
     Matrix(u32, u32),
     Array(u32, Box<Shape>),
-    Struct(Vec<(String, Shape)>),
+    /// Its name and members.
+    Struct(String, Vec<(String, Shape)>),
 }
 
 impl Shape {
@@ -37,6 +38,7 @@ impl Shape {
                 Self::Array(n.get(), Box::new(Self::new(module, *base)))
             }
             TypeInner::Struct { members, .. } => Self::Struct(
+                module.types[ty].name.clone().unwrap(),
                 (members.iter().map(|m| (m.name.clone().unwrap(), Self::new(module, m.ty)))).collect(),
             ),
             other => panic!("the harness cannot pass {other:?}; teach it"),
@@ -50,7 +52,7 @@ impl Shape {
             Self::Vector(n) => *n as usize,
             Self::Matrix(columns, rows) => (columns * rows) as usize,
             Self::Array(n, base) => *n as usize * base.len(),
-            Self::Struct(members) => members.iter().map(|(_, shape)| shape.len()).sum(),
+            Self::Struct(_, members) => members.iter().map(|(_, shape)| shape.len()).sum(),
         }
     }
 
@@ -78,7 +80,10 @@ impl Shape {
                 };
                 format!("array<{name}, {n}>({})", list(*n, at, &|at| base.read(at)))
             }
-            Self::Struct(_) => panic!("the harness cannot pass a struct; teach it"),
+            Self::Struct(name, members) => {
+                let values: Vec<String> = members.iter().map(|(_, shape)| shape.read(at)).collect();
+                format!("{name}({})", values.join(", "))
+            }
         }
     }
 
@@ -94,7 +99,7 @@ impl Shape {
             Self::Array(n, base) => {
                 (0..*n).for_each(|i| base.flatten(&format!("{expression}[{i}]"), into));
             }
-            Self::Struct(members) => {
+            Self::Struct(_, members) => {
                 members.iter().for_each(|(name, shape)| shape.flatten(&format!("{expression}.{name}"), into));
             }
         }

@@ -1,0 +1,116 @@
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_ambient.wesl, by ./x shaders. Needs: fuzz_layer
+
+// The layer of fibres in light from all around, given as order-2 spherical harmonics.
+//
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+//
+// Ambient light of the layer is `c_f fuzz_g fuzz_ambient_factor fuzz_ambient_radiance`: the mean of the layer's
+// geometry, a polynomial for what the phase function gathers, and the light along the lobe's mean direction. The talk
+// has `1 - P_s(v)` for the second and the hemisphere's mean for the third.
+
+#ifndef KINRAN_FUZZ_AMBIENT_GLSL
+#define KINRAN_FUZZ_AMBIENT_GLSL
+
+#include "fuzz_layer.glsl"
+
+/// Mean over the hemisphere of the layer's BRDF times cosine over phase (slide: Ambient Lighting, `G~`), for a view at
+/// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
+/// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002.
+///
+/// Cost on GCN: 15 instructions (4 at a quarter of the rate).
+float fuzz_g(float density, float n_v) {
+    float dense = 1.0 - (n_v * log((1.0 + (1.0 / n_v))));
+    float y = density / (n_v * dense);
+    float e = exp2((-1.442695 * y));
+    return (dense * (1.0 - e)) * (1.0 - ((0.1 * y) * e));
+}
+
+/// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients.
+///
+/// Cost on GCN: 8 instructions (1 at a quarter of the rate).
+float fuzz_g_talk(float coefficients[4], float density, float n_v) {
+    float above = 1.0 + (n_v * (coefficients[0] + (coefficients[1] * n_v)));
+    return (density * above) / (density + (n_v * (coefficients[2] + ((coefficients[3] * n_v) * n_v))));
+}
+
+/// Share of uniform irradiance that reaches the base unscattered, `2 E_3(d)` (slide: Ambient Shadowing, `Q~`); within
+/// 0.00043 for densities in [0, 3].
+///
+/// Cost on GCN: 11 instructions (2 at a quarter of the rate).
+float fuzz_q(float density) {
+    float above = 1.0 + (density * (3.07323 + (0.102541 * density)));
+    float _e9 = fuzz_passage(density, 1.0);
+    return (_e9 * above) / (1.0 + (density * (4.02006 + (1.98275 * density))));
+}
+
+/// The talk's form of `fuzz_q`, `1 + c_0 d + c_1 d²`, by two coefficients; turns up outside the range of its fit.
+///
+/// Cost on GCN: 2 instructions.
+float fuzz_q_talk(float coefficients[2], float density) {
+    return 1.0 + (density * (coefficients[0] + (coefficients[1] * density)));
+}
+
+/// What the phase function gathers of uniform light, over `fuzz_g`, as a polynomial of the view fitted for one tilt and
+/// one spread over densities of 0.05 to 0.5: the talk's six terms and the third and fourth power of `t_v`.
+///
+/// Cost on GCN: 8 instructions.
+float fuzz_ambient_factor(float coefficients[8], float n_v, float t_v) {
+    float along = t_v * (coefficients[2] + (t_v * (coefficients[5] + (t_v * (coefficients[6] + (t_v * coefficients[7]))))));
+    float across = n_v * ((coefficients[1] + (coefficients[3] * n_v)) + (coefficients[4] * t_v));
+    return max(((coefficients[0] + across) + along), 0.0);
+}
+
+/// Where the table that replaces `fuzz_ambient_factor` for combed fibres is read, each in [0, 1]: x is `n_v`, y runs
+/// with the cosine of the azimuth between view and fibre. `t_n` is `t·n`.
+///
+/// Cost on GCN: 7 instructions (1 at a quarter of the rate).
+vec2 fuzz_ambient_place(float n_v, float t_v, float t_n) {
+    float sines = sqrt(max(((1.0 - (n_v * n_v)) * (1.0 - (t_n * t_n))), 1e-12));
+    return vec2(n_v, clamp((0.5 + ((0.5 * (t_v - (n_v * t_n))) / sines)), 0.0, 1.0));
+}
+
+/// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a
+/// dense one adds to it.
+///
+/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
+float fuzz_ambient_tabulated(vec2 texel, float density, float n_v) {
+    return texel.x + ((texel.y * density) / (density + n_v));
+}
+
+/// Mean direction of the light that the lobe gathers, shorter than one, by four coefficients of the same fit:
+/// `c_0 n + c_1 v + (c_2 + c_3 t_v) t`.
+///
+/// Cost on GCN: 13 instructions.
+vec3 fuzz_ambient_direction(float coefficients[4], vec3 n, vec3 v, vec3 t) {
+    return ((n * coefficients[0]) + (v * coefficients[1])) + (t * (coefficients[2] + (coefficients[3] * dot(t, v))));
+}
+
+/// Mean radiance in the lobe, from the coefficients of `radiance` up to order 1 and `fuzz_ambient_direction`; exact for
+/// light that varies linearly with direction. Never negative.
+///
+/// Cost on GCN: 18 instructions.
+vec3 fuzz_ambient_radiance(vec3 radiance[9], vec3 direction) {
+    vec3 linear = ((radiance[3] * direction.x) + (radiance[1] * direction.y)) + (radiance[2] * direction.z);
+    return max(((radiance[0] * 0.2820948) + (linear * 0.48860252)), vec3(0.0));
+}
+
+/// Mean radiance over the hemisphere about the unit vector `n`: the talk's light. Never negative.
+///
+/// Cost on GCN: 21 instructions.
+vec3 fuzz_ambient_mean(vec3 radiance[9], vec3 n) {
+    vec3 _e4 = fuzz_ambient_radiance(radiance, (n * 0.5));
+    return _e4;
+}
+
+/// Factor on the base's ambient light, diffuse or from a specular probe (slide: Ambient Shadowing, `c_atten`):
+/// `P_e (Q + c_f R (1 - Q))`. `downward` is R, the mean of P_s over uniform irradiance, which depends on tilt and spread;
+/// 1/2 for fibres in all directions. The slide's R lacks a 1/π.
+///
+/// Cost on GCN: 8 instructions.
+vec3 fuzz_ambient_attenuation(float escaped, float q, float downward, vec3 fibre_color) {
+    return (vec3(q) + (fibre_color * (downward * (1.0 - q)))) * escaped;
+}
+
+#endif

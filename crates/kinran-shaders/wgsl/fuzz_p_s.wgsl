@@ -1,0 +1,53 @@
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/fuzz_p_s.wesl, by ./x shaders. Needs: nothing else
+
+// P_s: the share of scattered light that a fibre sends down to the base.
+//
+// Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
+
+/// A step of Laguerre's iteration for the largest root of `l³ + square l² + linear l + constant`, whose roots are all
+/// real.
+///
+/// Cost on GCN: 18 instructions (2 at a quarter of the rate).
+fn fibre_p_s_step(l: f32, constant: f32, linear: f32, square: f32) -> f32 {
+    let value = ((l + square) * l + linear) * l + constant;
+    let slope = (3.0 * l + 2.0 * square) * l + linear;
+    let bend = 6.0 * l + 2.0 * square;
+    let root = sqrt(max(4.0 * slope * slope - 6.0 * value * bend, 0.0));
+    return l - 3.0 * value / max(slope + root, 1e-20);
+}
+
+/// P_s of SGGX fibres, exactly (slide: Base Layer, "no analytical expression"): one minus the integral of
+/// `fibre_phase(u, v)` over the `v` above the horizon, for a light at cosines `n_u` ≥ 0 to the normal and `t_u` to the
+/// fibres, whose own cosine to the normal is `t_n`. It is the form factor of an elliptic cone: with the positive root λ
+/// of `χ = λ³ + (α² c + 2 k t_u t_n) λ² - (α² + k (1 - t_u² - t_n²)) λ - α² c`, `c = n_u`, `k = 1 - α²`,
+/// `1 - P_s = λ sqrt((λ + c) (λ + α² c/σ²)) / χ'(λ)`. Laguerre's iteration from 1 falls on λ.
+///
+/// Cost on GCN: 91 instructions (11 at a quarter of the rate).
+fn fibre_p_s(n_u: f32, t_u: f32, t_n: f32, alpha: f32) -> f32 {
+    let alpha_sqr = alpha * alpha;
+    let k = 1.0 - alpha_sqr;
+    let constant = -alpha_sqr * n_u;
+    let linear = -(alpha_sqr + k * (1.0 - t_u * t_u - t_n * t_n));
+    let square = alpha_sqr * n_u + 2.0 * k * t_u * t_n;
+
+    // Four steps cube the error four times.
+    let first = fibre_p_s_step(1.0, constant, linear, square);
+    let second = fibre_p_s_step(first, constant, linear, square);
+    let third = fibre_p_s_step(second, constant, linear, square);
+    let l = fibre_p_s_step(third, constant, linear, square);
+    let slope = (3.0 * l + 2.0 * square) * l + linear;
+    let area_sqr = 1.0 - k * t_u * t_u;
+    let upward = l * sqrt((l + n_u) * (l + alpha_sqr * n_u / area_sqr)) / max(slope, 1e-20);
+    return saturate(1.0 - upward);
+}
+
+/// P_s by the talk's six coefficients (slide: Base Layer), fitted for one tilt and one spread: `c_0 + c_1 n_u + c_2 t_u +
+/// c_3 n_u² + c_4 n_u t_u + c_5 t_u²`, clamped to [0, 1]. `kinran fit fuzz` prints them with their error.
+///
+/// Cost on GCN: 5 instructions.
+fn fuzz_p_s(coefficients: array<f32, 6>, n_u: f32, t_u: f32) -> f32 {
+    let across = n_u * (coefficients[1] + coefficients[3] * n_u + coefficients[4] * t_u);
+    return saturate(coefficients[0] + across + t_u * (coefficients[2] + coefficients[5] * t_u));
+}
