@@ -2,10 +2,12 @@
 
 pub mod aniso;
 mod channels;
+pub mod curvature;
 pub mod detail;
 pub mod folder;
 mod material;
 mod mips;
+pub mod skin_lut;
 
 pub use material::{MaterialSurface, NoSurface, material_surface};
 pub use mips::{

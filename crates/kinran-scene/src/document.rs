@@ -1,5 +1,7 @@
 //! A glTF document as JSON and bytes, for tools that replace its textures and keep everything else.
 
+mod mesh;
+
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
@@ -10,6 +12,8 @@ use serde_json::{Map, Value, json};
 
 use crate::Error;
 use crate::container::{Target, join, parse_uri, read_regular_file, split};
+
+pub use mesh::Attribute;
 
 /// A JSON object.
 pub type Object = Map<String, Value>;
@@ -68,7 +72,7 @@ impl TextureExtension {
 }
 
 /// Extensions that are known not to refer to images, textures or buffer views other than where this
-/// module looks; with any other one present, nothing is renumbered. `KHR_materials_*` are known too.
+/// module looks; with any other one present, nothing is renumbered. `KHR_materials_*` and `KINRAN_*` are known too.
 const KNOWN_EXTENSIONS: [&str; 19] = [
     "EXT_mesh_gpu_instancing",
     "EXT_mesh_manifold",
@@ -125,6 +129,8 @@ pub struct Document {
     original_images: BTreeSet<usize>,
     /// Images that [`Document::add_image_file`] has added: the caller writes their files.
     added_images: BTreeSet<usize>,
+    /// Index and bytes of a buffer that [`Document::set_attribute`] has added.
+    added_buffer: Option<(usize, Vec<u8>)>,
 }
 
 impl Document {
@@ -158,6 +164,7 @@ impl Document {
             original_textures,
             original_images,
             added_images: BTreeSet::new(),
+            added_buffer: None,
         })
     }
 
@@ -417,7 +424,8 @@ impl Document {
         let unknown: Vec<&str> = array(&output.json, "extensionsUsed")
             .iter()
             .filter_map(Value::as_str)
-            .filter(|name| !KNOWN_EXTENSIONS.contains(name) && !name.starts_with("KHR_materials_"))
+            .filter(|name| !KNOWN_EXTENSIONS.contains(name))
+            .filter(|name| !name.starts_with("KHR_materials_") && !name.starts_with("KINRAN_"))
             .collect();
         if !unknown.is_empty() {
             if !textures.is_empty() {
@@ -482,7 +490,8 @@ impl Document {
         for buffer in 0..count {
             let uri =
                 array(&output.json, "buffers")[buffer].get("uri").and_then(Value::as_str).map(str::to_owned);
-            let in_bin = uri.is_none() && buffer == 0 && self.bin.is_some();
+            let added = self.added_buffer.as_ref().is_some_and(|(added, _)| *added == buffer);
+            let in_bin = added || uri.is_none() && buffer == 0 && self.bin.is_some();
             // Without a uri it is an extension's placeholder.
             if uri.is_none() && !in_bin {
                 continue;
@@ -669,6 +678,9 @@ impl Document {
             .get(buffer)
             .ok_or_else(|| Error::malformed(&self.path, format!("{what} does not exist")))?;
         let length = entry.get("byteLength").and_then(index).unwrap_or(0);
+        if let Some((_, bytes)) = self.added_buffer.as_ref().filter(|(added, _)| *added == buffer) {
+            return Ok(Cow::Borrowed(bytes));
+        }
         let bytes = match (entry.get("uri").and_then(Value::as_str), &self.bin) {
             (Some(uri), _) => Cow::Owned(self.fetch(uri, &what)?),
             (None, Some(bin)) if buffer == 0 => Cow::Borrowed(bin.as_slice()),

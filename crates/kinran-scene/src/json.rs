@@ -147,6 +147,8 @@ pub(crate) struct Primitive {
     pub(crate) mode: u32,
     #[serde(default)]
     pub(crate) targets: Vec<Value>,
+    #[serde(default)]
+    pub(crate) extensions: Extensions,
 }
 
 #[derive(Deserialize)]
@@ -158,6 +160,50 @@ pub(crate) struct Attributes {
     pub(crate) texcoord_0: Option<usize>,
     pub(crate) texcoord_1: Option<usize>,
     pub(crate) color_0: Option<usize>,
+    #[serde(rename = "_CURVATURE")]
+    pub(crate) curvature: Option<usize>,
+}
+
+/// `KINRAN_mesh_curvature` of a primitive.
+#[derive(Deserialize)]
+pub(crate) struct MeshCurvature {
+    #[serde(default = "half")]
+    pub(crate) range: f32,
+}
+
+/// `KINRAN_materials_skin`.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Skin {
+    #[serde(default)]
+    pub(crate) profile: SkinProfile,
+    #[serde(default = "one")]
+    pub(crate) scatter_scale: f32,
+    #[serde(default)]
+    pub(crate) second_lobe: SecondLobe,
+    #[serde(default)]
+    pub(crate) normal_blur: [f32; 3],
+    #[serde(default)]
+    pub(crate) penumbra: f32,
+}
+
+#[derive(Default, Deserialize)]
+pub(crate) struct SkinProfile {
+    pub(crate) gaussians: Option<Vec<SkinGaussian>>,
+    pub(crate) burley: Option<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct SkinGaussian {
+    pub(crate) variance: f64,
+    pub(crate) weight: [f64; 3],
+}
+
+#[derive(Default, Deserialize)]
+pub(crate) struct SecondLobe {
+    pub(crate) share: f32,
+    #[serde(default)]
+    pub(crate) roughness: f32,
 }
 
 #[derive(Deserialize)]

@@ -16,9 +16,10 @@ mod scene;
 mod studio;
 mod tangent;
 
-pub use document::{Document, Object, Slot, TextureExtension};
+pub use document::{Attribute, Document, Object, Slot, TextureExtension};
 pub use environment::Environment;
 pub use error::Error;
 pub use scene::{
-    AlphaMode, Anisotropy, Camera, Instance, Light, LightKind, Material, Primitive, Scene, TextureRef, Wrap,
+    AlphaMode, Anisotropy, Camera, Instance, Light, LightKind, Material, Primitive, Scene, Skin, SkinProfile,
+    Source, TextureRef, VertexCurvature, Wrap,
 };

@@ -12,14 +12,14 @@ use serde::Deserialize;
 use crate::accessor::Accessors;
 use crate::container::{Resolver, beside, fetch, read_regular_file, split};
 use crate::{
-    AlphaMode, Anisotropy, Camera, Error, Instance, Light, LightKind, Material, Primitive, Scene, TextureRef,
-    Wrap, json, tangent,
+    AlphaMode, Anisotropy, Camera, Error, Instance, Light, LightKind, Material, Primitive, Scene, Skin,
+    SkinProfile, Source, TextureRef, VertexCurvature, Wrap, json, tangent,
 };
 
 /// Extensions that may stand in `extensionsRequired`: those this module reads, and those that change how
 /// a surface looks but leave the rest of the document as it is; the latter are listed in
 /// [`Material::ignored_extensions`] or in [`Scene::warnings`].
-const ADMITTED_EXTENSIONS: [&str; 22] = [
+const ADMITTED_EXTENSIONS: [&str; 24] = [
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -40,12 +40,15 @@ const ADMITTED_EXTENSIONS: [&str; 22] = [
     "KHR_texture_basisu",
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
+    "KINRAN_materials_skin",
+    "KINRAN_mesh_curvature",
     "MSFT_texture_dds",
     "KHR_animation_pointer",
 ];
 
 /// Material extensions that [`Material`] represents.
-const READ_MATERIAL_EXTENSIONS: [&str; 2] = ["KHR_materials_anisotropy", "KHR_materials_emissive_strength"];
+const READ_MATERIAL_EXTENSIONS: [&str; 3] =
+    ["KHR_materials_anisotropy", "KHR_materials_emissive_strength", "KINRAN_materials_skin"];
 
 /// Texture extensions whose image is taken when a texture has no core one.
 const TEXTURE_EXTENSIONS: [&str; 2] = ["KHR_texture_basisu", "MSFT_texture_dds"];
@@ -267,6 +270,7 @@ impl Loader<'_> {
             emissive_factor: self.finite(emissive.to_array(), &format!("{what}: emissiveFactor"))?.into(),
             emissive: self.texture(&material.emissive_texture, &format!("{what}: emissiveTexture"))?,
             anisotropy,
+            skin: self.skin(&material.extensions, &what)?,
             alpha_mode: match material.alpha_mode {
                 json::AlphaMode::Opaque => AlphaMode::Opaque,
                 json::AlphaMode::Mask => AlphaMode::Mask {
@@ -280,6 +284,60 @@ impl Loader<'_> {
                 .cloned()
                 .collect(),
         })
+    }
+
+    /// `KINRAN_materials_skin`.
+    fn skin(&mut self, extensions: &json::Extensions, what: &str) -> Result<Option<Skin>, Error> {
+        let Some(skin) = self.extension::<json::Skin>(extensions, "KINRAN_materials_skin", what)? else {
+            return Ok(None);
+        };
+        let what = format!("{what}: KINRAN_materials_skin");
+        let positive = |value: f64, name: &str| {
+            if value > 0.0 && value.is_finite() {
+                return Ok(());
+            }
+            Err(self.error(format!("{what}: {name} is {value}; it must be above zero")))
+        };
+        positive(f64::from(skin.scatter_scale), "scatterScale")?;
+        let profile = match (skin.profile.gaussians, skin.profile.burley) {
+            (Some(_), Some(_)) => {
+                return Err(self.error(format!("{what}: profile has both gaussians and burley; keep one")));
+            }
+            (Some(sum), None) => {
+                for g in &sum {
+                    positive(g.variance, "a variance of the profile")?;
+                    if !g.weight.iter().all(|w| w.is_finite() && *w >= 0.0) {
+                        let weight = g.weight;
+                        return Err(self.error(format!(
+                            "{what}: a weight of the profile is {weight:?}; weights are not below zero"
+                        )));
+                    }
+                }
+                if !(0..3).all(|c| sum.iter().any(|g| g.weight[c] > 0.0)) {
+                    return Err(self.error(format!(
+                        "{what}: profile.gaussians leaves a channel without weight; each needs one above zero"
+                    )));
+                }
+                SkinProfile::Gaussians(sum.iter().map(|g| (g.variance, g.weight)).collect())
+            }
+            (None, Some(d)) => {
+                d.iter().try_for_each(|&d| positive(d, "a length of profile.burley"))?;
+                SkinProfile::Burley(d)
+            }
+            (None, None) => SkinProfile::Human,
+        };
+        let [r, g, b] = skin.normal_blur;
+        let blur = format!("{what}: normalBlur");
+        let [penumbra] = self.finite([skin.penumbra], &format!("{what}: penumbra"))?;
+        Ok(Some(Skin {
+            profile,
+            scatter_scale: skin.scatter_scale,
+            second_roughness: self
+                .unit(skin.second_lobe.roughness, &format!("{what}: secondLobe.roughness"))?,
+            second_share: self.unit(skin.second_lobe.share, &format!("{what}: secondLobe.share"))?,
+            normal_blur: Vec3::new(self.unit(r, &blur)?, self.unit(g, &blur)?, self.unit(b, &blur)?),
+            penumbra: penumbra.max(0.0),
+        }))
     }
 
     fn extension<'de, T: Deserialize<'de>>(
@@ -365,7 +423,8 @@ impl Loader<'_> {
                     Some(name) => format!("mesh {m} \"{name}\", primitive {p}"),
                     None => format!("mesh {m}, primitive {p}"),
                 };
-                if let Some(primitive) = self.primitive(primitive, &what)? {
+                if let Some(mut primitive) = self.primitive(primitive, &what)? {
+                    (primitive.source.mesh, primitive.source.primitive) = (m, p);
                     self.scene.primitives.push(primitive);
                 }
             }
@@ -413,7 +472,12 @@ impl Loader<'_> {
             Some(accessor) => self.accessors.floats::<4>(accessor, &format!("{what}: TANGENT"))?,
             None => Vec::new(),
         };
+        let codes = match attributes.curvature {
+            Some(accessor) => self.accessors.floats::<4>(accessor, &format!("{what}: _CURVATURE"))?,
+            None => Vec::new(),
+        };
         let counts = [
+            ("_CURVATURE", codes.len(), attributes.curvature.is_some()),
             ("NORMAL", normals.len(), attributes.normal.is_some()),
             ("TANGENT", tangents.len(), attributes.tangent.is_some()),
             ("TEXCOORD_0", uvs[0].len(), attributes.texcoord_0.is_some()),
@@ -429,6 +493,11 @@ impl Loader<'_> {
             }
         }
 
+        let curvature = match attributes.curvature {
+            Some(_) => Some(self.curvature(primitive, &codes, what)?),
+            None => None,
+        };
+
         let triangles = self.triangles(primitive, positions.len(), what)?;
         if triangles.is_empty() {
             self.warn(format!("{what} has no triangles; it was left out"));
@@ -440,11 +509,46 @@ impl Loader<'_> {
             tangents: tangents.into_iter().map(Vec4::from).collect(),
             uvs,
             colors: colors.into_iter().map(Vec4::from).collect(),
+            curvature,
             triangles,
             material,
+            source: Source {
+                lacks_normals: attributes.normal.is_none(),
+                lacks_tangents: attributes.tangent.is_none(),
+                ..Source::default()
+            },
         };
         self.complete(&mut primitive, what);
         Ok(Some(primitive))
+    }
+
+    /// `_CURVATURE` with the range that `KINRAN_mesh_curvature` gives.
+    fn curvature(
+        &mut self,
+        primitive: &json::Primitive,
+        codes: &[[f32; 4]],
+        what: &str,
+    ) -> Result<VertexCurvature, Error> {
+        let extension: Option<json::MeshCurvature> =
+            self.extension(&primitive.extensions, "KINRAN_mesh_curvature", what)?;
+        let range = extension.map_or(0.5, |extension| extension.range);
+        if !(range > 0.0 && range.is_finite()) {
+            return Err(
+                self.error(format!("{what}: KINRAN_mesh_curvature: range is {range}; it must be above zero"))
+            );
+        }
+        if let Some(at) = codes.iter().position(|code| code.iter().any(|x| !(0.0..=1.0).contains(x))) {
+            return Err(self.error(format!(
+                "{what}: element {at} of _CURVATURE is {:?}; its accessor must be normalised unsigned bytes",
+                codes[at]
+            )));
+        }
+        if primitive.attributes.tangent.is_none() {
+            self.warn(format!(
+                "{what} has _CURVATURE but no TANGENT, so its directions may be wrong; bake it anew"
+            ));
+        }
+        Ok(VertexCurvature { codes: codes.iter().copied().map(Vec4::from).collect(), range })
     }
 
     /// The vertex indices of each triangle (glTF 2.0 section 3.7.2.1, primitive topologies).

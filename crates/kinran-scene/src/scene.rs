@@ -37,6 +37,72 @@ pub struct Anisotropy {
     pub texture: Option<TextureRef>,
 }
 
+/// Where light that enters skin leaves it, in `KINRAN_materials_skin`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum SkinProfile {
+    /// Human skin, six Gaussians.
+    #[default]
+    Human,
+    /// Gaussians: variance in square millimetres and weight, RGB.
+    Gaussians(Vec<(f64, [f64; 3])>),
+    /// Burley's normalised diffusion: d of each channel in millimetres.
+    Burley([f64; 3]),
+}
+
+/// `KINRAN_materials_skin`: the diffuse lobe is pre-integrated skin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Skin {
+    /// The diffusion profile.
+    pub profile: SkinProfile,
+    /// Multiplies the profile's lengths; above zero.
+    pub scatter_scale: f32,
+    /// Perceptual roughness of a second lobe of gloss, 0 to 1.
+    pub second_roughness: f32,
+    /// Weight of that lobe, 0 to 1; the first one has the rest.
+    pub second_share: f32,
+    /// How far the diffuse normal of each channel turns towards the mesh's, 0 to 1.
+    pub normal_blur: Vec3,
+    /// Width in millimetres of the penumbra that shadows scatter in; 0 for none.
+    pub penumbra: f32,
+}
+
+impl Default for Skin {
+    fn default() -> Self {
+        Skin {
+            profile: SkinProfile::Human,
+            scatter_scale: 1.0,
+            second_roughness: 0.0,
+            second_share: 0.0,
+            normal_blur: Vec3::ZERO,
+            penumbra: 0.0,
+        }
+    }
+}
+
+/// `_CURVATURE`: curvature tensors of vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VertexCurvature {
+    /// As `curvature_encode` of `kinran-shading` makes them, 0 to 1.
+    pub codes: Vec<Vec4>,
+    /// Curvature of the code one, 1/mm.
+    pub range: f32,
+}
+
+/// Where a primitive comes from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Source {
+    /// Index of the document's mesh.
+    pub mesh: usize,
+    /// Its number among the mesh's primitives.
+    pub primitive: usize,
+    /// The vertex of the document's primitive that each vertex was; empty where they are the same.
+    pub vertices: Vec<u32>,
+    /// The document has no normals here; those of [`Primitive`] are flat.
+    pub lacks_normals: bool,
+    /// The document has no tangents here; those of [`Primitive`] were made.
+    pub lacks_tangents: bool,
+}
+
 /// What happens where a surface's alpha is below one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AlphaMode {
@@ -80,6 +146,8 @@ pub struct Material {
     pub emissive: Option<TextureRef>,
     /// `KHR_materials_anisotropy`, when present.
     pub anisotropy: Option<Anisotropy>,
+    /// `KINRAN_materials_skin`, when present.
+    pub skin: Option<Skin>,
     /// Transparency.
     pub alpha_mode: AlphaMode,
     /// Both sides are lit; otherwise back faces are culled.
@@ -118,10 +186,14 @@ pub struct Primitive {
     pub uvs: [Vec<Vec2>; 2],
     /// Linear RGBA; empty when absent.
     pub colors: Vec<Vec4>,
+    /// `_CURVATURE`, when present.
+    pub curvature: Option<VertexCurvature>,
     /// Vertex indices of each triangle.
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Scene::materials`].
     pub material: usize,
+    /// Where it comes from.
+    pub source: Source,
 }
 
 /// A primitive placed in the world.

@@ -81,6 +81,14 @@ fn gather(primitive: &mut Primitive, vertices: &[usize]) {
     pick(&mut primitive.uvs[0], vertices);
     pick(&mut primitive.uvs[1], vertices);
     pick(&mut primitive.colors, vertices);
+    if let Some(curvature) = &mut primitive.curvature {
+        pick(&mut curvature.codes, vertices);
+    }
+    if primitive.source.vertices.is_empty() {
+        primitive.source.vertices = vertices.iter().map(|&v| v as u32).collect();
+    } else {
+        pick(&mut primitive.source.vertices, vertices);
+    }
     primitive.triangles = (0..vertices.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
 }
 

@@ -17,6 +17,7 @@ mod ggx;
 mod multiscatter;
 mod sggx;
 pub mod sh;
+pub mod skin;
 mod sqrt;
 mod sym;
 

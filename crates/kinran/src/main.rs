@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 #[cfg(feature = "view")]
 use kinran::viewer;
-use kinran::{Console, Error, bake, compare, demo, detail, inspect, render, shaders};
+use kinran::{Console, Error, bake, compare, demo, detail, inspect, render, shaders, skin_lut};
 
 /// Anisotropic materials from authored maps to pictures.
 #[derive(Parser)]
@@ -47,6 +47,7 @@ enum Command {
     Detail(detail::Args),
     Inspect(inspect::Args),
     Shaders(shaders::Args),
+    SkinLut(skin_lut::Args),
     #[cfg(feature = "view")]
     View(Box<viewer::Args>),
 }
@@ -74,6 +75,7 @@ fn run(command: &Command, console: &Console) -> Result<(), Error> {
         #[cfg(feature = "view")]
         Command::View(args) => viewer::run(args, console),
         Command::Shaders(args) => shaders::run(args, console),
+        Command::SkinLut(args) => skin_lut::run(args, console),
     }
 }
 

@@ -1,0 +1,197 @@
+//! Tables of pre-integrated skin: punctual light, ambient light, shadows' penumbras.
+
+use kinran_image::{Error, Format, Level, Texture, Transfer, encode_half};
+use kinran_shading::skin::profile::{Gaussian, ProfileError, RadialProfile};
+use rayon::prelude::*;
+
+use crate::srgb_from_linear;
+
+/// A diffusion profile that owns its numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Profile {
+    /// A sum of Gaussians.
+    Gaussians(Vec<Gaussian>),
+    /// Burley's, by the length d of each channel in millimetres.
+    Burley([f64; 3]),
+    /// Burley's, by mean free path in millimetres and albedo of each channel.
+    MeanFreePath {
+        /// Millimetres.
+        path: [f64; 3],
+        /// 0 to 1.
+        albedo: [f64; 3],
+    },
+    /// Distances in millimetres and densities.
+    Table(Vec<(f64, [f64; 3])>),
+}
+
+impl Default for Profile {
+    /// The six Gaussians of human skin.
+    fn default() -> Self {
+        Profile::Gaussians(kinran_shading::skin::profile::SKIN.to_vec())
+    }
+}
+
+impl Profile {
+    /// The profile's radial form.
+    ///
+    /// # Errors
+    /// [`ProfileError`] where the numbers are no profile.
+    pub fn radial(&self) -> Result<RadialProfile<'_>, ProfileError> {
+        match self {
+            Profile::Gaussians(sum) => RadialProfile::gaussians(sum),
+            Profile::Burley(d) => RadialProfile::burley(*d),
+            Profile::MeanFreePath { path, albedo } => RadialProfile::from_mean_free_path(*path, *albedo),
+            Profile::Table(rows) => RadialProfile::table(rows),
+        }
+    }
+}
+
+/// Samples of a tabulated profile along a line.
+const SAMPLES: usize = 4096;
+
+/// A table of RGB, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// Entries in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// `width * height` entries.
+    pub entries: Vec<[f32; 3]>,
+}
+
+/// What part of a punctual light's irradiance at normal incidence leaves skin: columns are n·u from -1 to 1, rows
+/// are curvature from 0 to `range` (1/mm), both at the middles of texels. Clamped, linear sampling reads it right.
+pub fn punctual_table(profile: RadialProfile<'_>, width: usize, height: usize, range: f64) -> Table {
+    let mut samples = vec![[0.0; 3]; SAMPLES];
+    let linear = profile.to_linear().sampled(&mut samples);
+    let mut entries = vec![[0.0f32; 3]; width * height];
+    entries.par_chunks_mut(width).enumerate().for_each(|(row, entries)| {
+        let mut exact = vec![[0.0; 3]; width];
+        linear.ring_row((row as f64 + 0.5) / height as f64 * range, &mut exact);
+        for (entry, exact) in entries.iter_mut().zip(exact) {
+            *entry = exact.map(|x| x as f32);
+        }
+    });
+    Table { width, height, entries }
+}
+
+/// What skin leaves of ambient light's harmonics: columns are mean curvature from 0 to `range` (1/mm) at the middles of
+/// texels, row 0 is band 1 and row 1 is band 2. Band 0 is left whole.
+pub fn ambient_table(profile: RadialProfile<'_>, width: usize, range: f64) -> Table {
+    let factors: Vec<_> =
+        (0..width).map(|i| profile.band_factors((i as f64 + 0.5) / width as f64 * range)).collect();
+    let (one, two) = (factors.iter().map(|f| f.h_one), factors.iter().map(|f| f.h_two));
+    Table { width, height: 2, entries: one.chain(two).map(|h| h.map(|x| x as f32)).collect() }
+}
+
+/// What part of a light skin in a shadow's penumbra gets: columns are the filtered shadow from 0 to 1, rows are one over
+/// the penumbra's width from 0 to `range` (1/mm), both at the middles of texels.
+pub fn penumbra_table(profile: RadialProfile<'_>, width: usize, height: usize, range: f64) -> Table {
+    let mut samples = vec![[0.0; 3]; SAMPLES];
+    let linear = profile.to_linear().sampled(&mut samples);
+    let mut entries = vec![[0.0f32; 3]; width * height];
+    entries.par_chunks_mut(width).enumerate().for_each(|(row, entries)| {
+        let penumbra = height as f64 / ((row as f64 + 0.5) * range);
+        for (column, entry) in entries.iter_mut().enumerate() {
+            let shadow = (column as f64 + 0.5) / width as f64;
+            *entry = linear.penumbra(shadow, penumbra).map(|x| x as f32);
+        }
+    });
+    Table { width, height, entries }
+}
+
+/// How a table's numbers, 0 to 1, become texels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum TableFormat {
+    /// Half floats.
+    #[default]
+    Rgba16F,
+    /// A byte a channel, sRGB: small values get most codes, and the sampler decodes for nothing.
+    Srgb8,
+    /// A byte a channel, as it is.
+    Linear8,
+}
+
+impl Table {
+    /// Linear interpolation at `u`, `v` from 0 to 1 across and down, clamped at the edges, as a sampler reads it.
+    pub fn sample(&self, u: f32, v: f32) -> [f32; 3] {
+        let place = |x: f32, n: usize| {
+            let x = (x * n as f32 - 0.5).clamp(0.0, (n - 1) as f32);
+            let i = (x as usize).min(n.saturating_sub(2));
+            (i, (i + 1).min(n - 1), x - i as f32)
+        };
+        let ((x0, x1, tx), (y0, y1, ty)) = (place(u, self.width), place(v, self.height));
+        let at = |x: usize, y: usize| self.entries[y * self.width + x];
+        std::array::from_fn(|c| {
+            let row = |y| at(x0, y)[c] + tx * (at(x1, y)[c] - at(x0, y)[c]);
+            row(y0) + ty * (row(y1) - row(y0))
+        })
+    }
+
+    /// The table as a texture of one level, alpha one.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where a number is none, or too large for a half float.
+    pub fn texture(&self, format: TableFormat) -> Result<Texture, Error> {
+        let byte = |x: f32| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
+        let texels = self.entries.iter();
+        let (layout, transfer, data) = match format {
+            TableFormat::Rgba16F => {
+                let rgba: Vec<[f32; 4]> = texels.map(|&[r, g, b]| [r, g, b, 1.0]).collect();
+                (Format::Rgba16F, Transfer::Linear, encode_half(&rgba)?)
+            }
+            TableFormat::Srgb8 => {
+                let encode = |x: f32| byte(srgb_from_linear(x.clamp(0.0, 1.0)));
+                let data = texels.flat_map(|&[r, g, b]| [encode(r), encode(g), encode(b), 255]).collect();
+                (Format::Rgba8, Transfer::Srgb, data)
+            }
+            TableFormat::Linear8 => {
+                let data = texels.flat_map(|&[r, g, b]| [byte(r), byte(g), byte(b), 255]).collect();
+                (Format::Rgba8, Transfer::Linear, data)
+            }
+        };
+        let level = Level { width: self.width as u32, height: self.height as u32, data };
+        Ok(Texture { format: layout, transfer, levels: vec![level], metadata: Default::default() })
+    }
+
+    /// The largest difference between the table and a texture of it, as a sampler decodes it.
+    ///
+    /// # Errors
+    /// Where the texture is not of this table's size.
+    pub fn texture_error(&self, texture: &Texture) -> Result<f32, Error> {
+        let decoded = texture.decode_level(0)?;
+        if decoded.len() != self.entries.len() {
+            return Err(Error::Unsupported("the texture has another size than the table".into()));
+        }
+        let decode = |x: f32| match texture.transfer {
+            Transfer::Srgb => crate::linear_from_srgb(x),
+            Transfer::Linear => x,
+        };
+        let pairs = self.entries.iter().zip(&decoded);
+        let differences = pairs.flat_map(|(e, d)| (0..3).map(move |c| (e[c] - decode(d[c])).abs()));
+        Ok(differences.fold(0.0, f32::max))
+    }
+}
+
+/// The largest error of reading a punctual table between its texels, on a grid four times as fine.
+pub fn punctual_interpolation_error(profile: RadialProfile<'_>, table: &Table, range: f64) -> f32 {
+    let mut samples = vec![[0.0; 3]; SAMPLES];
+    let linear = profile.to_linear().sampled(&mut samples);
+    let (columns, rows) = (4 * table.width, 4 * table.height);
+    (0..rows)
+        .into_par_iter()
+        .map(|row| {
+            let v = (row as f64 + 0.5) / rows as f64;
+            let mut exact = vec![[0.0; 3]; columns];
+            linear.ring_row(v * range, &mut exact);
+            let mut worst = 0.0f32;
+            for (column, exact) in exact.iter().enumerate() {
+                let u = (column as f64 + 0.5) / columns as f64;
+                let read = table.sample(u as f32, v as f32);
+                (0..3).for_each(|c| worst = worst.max((exact[c] as f32 - read[c]).abs()));
+            }
+            worst
+        })
+        .reduce(|| 0.0, f32::max)
+}

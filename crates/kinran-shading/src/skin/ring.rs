@@ -1,0 +1,204 @@
+//! Punctual light: the clamped cosine blurred around a cylinder (slide: Skin Shading | Curvature).
+//!
+//! `D(r, cos θ_l) = ∫ max(0, cos(θ_l - θ)) R(2 r sin(θ/2)) dθ / ∫ R(2 r sin(θ/2)) dθ`; the slide leaves the clamp
+//! out, without which D is a multiple of the cosine. R is the linear profile and its argument the chord: on a cylinder
+//! chord² plus the squared distance along the axis is the squared straight distance, so this is the exact integral
+//! of the radial profile over the cylinder.
+//!
+//! With p the normalised density of the angle and s = sin θ_l the integral is `cos θ_l A + sin θ_l B`, where A and B
+//! are those of `p cos` and `p sin` over the half circle that the light sees.
+
+use super::bessel::{scaled_i0, scaled_i1};
+use super::profile::{Gaussian, LinearProfile, Shape};
+use core::f64::consts::PI;
+use libm::{asin, cos, exp, sin, sqrt};
+
+/// Nodes and weights of the Gauss–Legendre rule of four points on [-1, 1].
+const GAUSS_LEGENDRE: [(f64, f64); 4] = [
+    (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+    (-0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
+    (0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
+    (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+];
+
+/// Below this curvature (1/mm; a radius of a kilometre) a surface is flat.
+const FLAT: f64 = 1e-6;
+
+/// n·u at the middle of each of `columns` equal columns from -1 to 1.
+pub fn column_n_u(column: usize, columns: usize) -> f64 {
+    (2 * column + 1) as f64 / columns as f64 - 1.0
+}
+
+impl LinearProfile<'_> {
+    /// Fills a row of the table of punctual light: at [`column_n_u`] of each entry, what part of the light's
+    /// irradiance at normal incidence leaves again, RGB, on a cylinder of `curvature` (1/mm, below zero counts as zero)
+    /// lit across its axis; 1e-6 absolute.
+    pub fn ring_row(&self, curvature: f64, row: &mut [[f64; 3]]) {
+        let columns = row.len();
+        if curvature <= FLAT {
+            for (i, d) in row.iter_mut().enumerate() {
+                *d = [column_n_u(i, columns).max(0.0); 3];
+            }
+            return;
+        }
+        row.fill([0.0; 3]);
+        match self.0 {
+            Shape::Gaussians(sum) => gaussian_row(sum, curvature.recip(), row),
+            _ => self.quadrature_row(curvature.recip(), row),
+        }
+    }
+
+    /// The same by quadrature of any density.
+    pub(crate) fn quadrature_row(&self, r: f64, row: &mut [[f64; 3]]) {
+        let columns = row.len();
+        let lit = columns / 2..columns;
+        let mut cumulative =
+            Cumulative { profile: self, r, at: 0.0, one: [0.0; 3], cos: [0.0; 3], sin: [0.0; 3] };
+
+        // A and B are differences of integrals from 0: those up to π/2 - θ first, then those up to π/2 + θ.
+        for i in lit.clone() {
+            let x = column_n_u(i, columns).max(0.0);
+            let angle = asin(x);
+            cumulative.advance(angle);
+            for c in 0..3 {
+                row[i][c] = x * cumulative.cos[c] - cos(angle) * cumulative.sin[c];
+            }
+        }
+        for i in lit.clone().rev() {
+            let x = column_n_u(i, columns).max(0.0);
+            let angle = asin(x);
+            cumulative.advance(PI - angle);
+            for c in 0..3 {
+                row[i][c] += x * cumulative.cos[c] + cos(angle) * cumulative.sin[c];
+            }
+        }
+        cumulative.advance(PI);
+
+        // The clamped cosine is half of cosine and its absolute value; the first turns its sign behind the terminator.
+        for i in lit {
+            let x = column_n_u(i, columns);
+            for c in 0..3 {
+                row[i][c] /= 2.0 * cumulative.one[c];
+                row[columns - 1 - i][c] = row[i][c] - x * cumulative.cos[c] / cumulative.one[c];
+            }
+        }
+    }
+}
+
+/// Integrals of the density, and of it times cosine and sine, from 0 up to an angle.
+struct Cumulative<'a, 'b> {
+    profile: &'a LinearProfile<'b>,
+    r: f64,
+    at: f64,
+    one: [f64; 3],
+    cos: [f64; 3],
+    sin: [f64; 3],
+}
+
+impl Cumulative<'_, '_> {
+    fn advance(&mut self, to: f64) {
+        let shortest = self.profile.shortest() / self.r;
+        let end = {
+            // Chords beyond the reach, the whole circle where the reach goes round it.
+            let half = 0.5 * self.profile.reach() / self.r;
+            if half >= 1.0 { PI } else { 2.0 * asin(half) }
+        };
+        // What is left out at the pole of Burley's density: 1e-9 ln 1e9 of its mass.
+        if self.at == 0.0 {
+            self.at = (1e-9 * shortest.min(PI)).min(to);
+        }
+        // Pieces double in length away from the pole and stay within what four points resolve.
+        while self.at < to && self.at < end {
+            let next = to.min(2.0 * self.at).min(self.at + shortest.min(0.1));
+            self.piece(self.at, next);
+            self.at = next;
+        }
+        self.at = self.at.max(to);
+    }
+
+    fn piece(&mut self, a: f64, b: f64) {
+        let (half, middle) = (0.5 * (b - a), 0.5 * (a + b));
+        for (node, weight) in GAUSS_LEGENDRE {
+            let angle = middle + half * node;
+            let density = self.profile.density(2.0 * self.r * sin(0.5 * angle));
+            let (sin, cos) = (sin(angle), cos(angle));
+            for (c, density) in density.into_iter().enumerate() {
+                let mass = half * weight * density;
+                self.one[c] += mass;
+                self.cos[c] += mass * cos;
+                self.sin[c] += mass * sin;
+            }
+        }
+    }
+}
+
+/// The sum of von Mises kernels that Gaussians of the chord are, for `κ = r²/v`.
+///
+/// `B = sinh(κ s) / (π κ I0)` and `A = I1 / 2 I0 + ∫ cosh(κ sqrt(1 - x²)) dx / (π I0)` from 0 to n·u: the sine that the
+/// change of variable brings is the one that the derivative of A has. The integrand is smooth, so Simpson's rule on
+/// the grid of the columns does.
+fn gaussian_row(sum: &[Gaussian], r: f64, row: &mut [[f64; 3]]) {
+    let columns = row.len();
+    let mut mass = [0.0; 3];
+    for g in sum {
+        let kappa = r * r / g.variance;
+        let (i0, i1) = (scaled_i0(kappa), scaled_i1(kappa));
+        let rho = i1 / i0;
+        let share = g.weight.map(|w| w * i0 / sqrt(g.variance));
+        for c in 0..3 {
+            mass[c] += share[c];
+        }
+
+        // exp(-κ) cosh(κ s) and exp(-κ) sinh(κ s), doubled; both from one exponential.
+        let both = exp(-2.0 * kappa);
+        let doubled = |s: f64| {
+            let grown = exp(-kappa * (1.0 - s));
+            let other = if both > 0.0 { both / grown } else { 0.0 };
+            (grown + other, grown - other)
+        };
+        let norm = 0.5 / (PI * i0);
+
+        // Panels of Simpson's rule that resolve a width of 1 / sqrt(κ).
+        let step = 2.0 / columns as f64;
+        let panels = libm::ceil(2.0 * step * sqrt(kappa)).max(1.0);
+        // Beyond, the integrand is below 1e-17 of its height.
+        let end = if kappa > 40.0 { sqrt(1.0 - (1.0 - 40.0 / kappa) * (1.0 - 40.0 / kappa)) } else { 1.0 };
+        let (mut at, mut integral) = (0.0, 0.0);
+        let (mut cosh_at, mut sinh_at) = doubled(1.0);
+        for i in columns / 2..columns {
+            let x = column_n_u(i, columns).max(0.0);
+            let s = sqrt(1.0 - x * x);
+            if at < end {
+                let width = (x - at) / panels;
+                for panel in 1..=panels as usize {
+                    let b = if panel == panels as usize { x } else { at + width };
+                    let middle = 0.5 * (at + b);
+                    let before = cosh_at;
+                    (cosh_at, sinh_at) = doubled(sqrt(1.0 - b * b));
+                    let (cosh_middle, _) = doubled(sqrt(1.0 - middle * middle));
+                    integral += (b - at) / 6.0 * (before + 4.0 * cosh_middle + cosh_at);
+                    at = b;
+                }
+            } else {
+                sinh_at = 0.0;
+            }
+            // The hyperbolic sine over a small κ keeps no digits.
+            let sinh_over_kappa = if kappa < 1e-4 { 2.0 * s } else { sinh_at / kappa };
+            let d = x * (0.5 * rho + norm * integral) + s * norm * sinh_over_kappa;
+            for c in 0..3 {
+                row[i][c] += share[c] * d;
+            }
+            if columns - 1 - i != i {
+                for c in 0..3 {
+                    row[columns - 1 - i][c] += share[c] * (d - x * rho);
+                }
+            }
+        }
+    }
+    for d in row {
+        for c in 0..3 {
+            // Rounding can leave -1e-17 in the dark.
+            d[c] = (d[c] / mass[c]).max(0.0);
+        }
+    }
+}

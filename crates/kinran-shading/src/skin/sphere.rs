@@ -1,0 +1,131 @@
+//! Ambient light: spherical harmonics of radiance blurred over a sphere (slide: Skin Shading, "radial profile with
+//! spherical integration").
+//!
+//! On a sphere of radius r the area between two chords is the planar one, `dA = 2π c dc`, and `cos θ = 1 - c² / 2r²`. A
+//! blur that depends on the angle alone multiplies band l of the harmonics by the mean of the Legendre polynomial
+//! P_l(cos θ) under the profile (Funk–Hecke). Band 0 keeps its light.
+
+use super::profile::{RadialProfile, Shape};
+use libm::{exp, expm1};
+
+/// What a profile does to bands 1 and 2 on a sphere, RGB each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BandFactors {
+    /// Of band 1, 0 to 1.
+    pub h_one: [f64; 3],
+    /// Of band 2, 0 to 1.
+    pub h_two: [f64; 3],
+}
+
+impl RadialProfile<'_> {
+    /// The factors on a sphere of `curvature` (1/mm, below zero counts as zero): its mean curvature at a point of skin.
+    ///
+    /// Gaussians have closed forms: kernels of von Mises and Fisher with `κ = r²/v`, whose mean cosine is
+    /// `coth κ - 1/κ`. So have Burley's profile and tables: truncated moments of exponentials and of polynomials.
+    pub fn band_factors(&self, curvature: f64) -> BandFactors {
+        if curvature <= 1e-6 {
+            return BandFactors { h_one: [1.0; 3], h_two: [1.0; 3] };
+        }
+        let r = curvature.recip();
+        let mut factors = BandFactors { h_one: [0.0; 3], h_two: [0.0; 3] };
+        match self.0 {
+            Shape::Gaussians(sum) => {
+                let mut mass = [0.0; 3];
+                for g in sum {
+                    let kappa = r * r / g.variance;
+                    let (one, two) = mean_legendre(kappa);
+                    let inside = -expm1(-2.0 * kappa);
+                    for c in 0..3 {
+                        let m = g.weight[c] * inside;
+                        mass[c] += m;
+                        factors.h_one[c] += m * one;
+                        factors.h_two[c] += m * two;
+                    }
+                }
+                for c in 0..3 {
+                    factors.h_one[c] /= mass[c];
+                    factors.h_two[c] /= mass[c];
+                }
+            }
+            Shape::Burley(d) => {
+                for c in 0..3 {
+                    // The mass within a chord has density (exp(-c/d) + exp(-c/3d)) / 4d.
+                    let (near, far) = (d[c], 3.0 * d[c]);
+                    let moment =
+                        |n| exponential_moment(n, near, 2.0 * r) + 3.0 * exponential_moment(n, far, 2.0 * r);
+                    let (h_one, h_two) = from_moments(r, moment(0), moment(2), moment(4));
+                    (factors.h_one[c], factors.h_two[c]) = (h_one, h_two);
+                }
+            }
+            Shape::Sampled { .. } => {}
+            Shape::Table(rows) => {
+                for c in 0..3 {
+                    let mut moments = [0.0; 3];
+                    let mut add = |c0: f64, c1: f64, a: f64, b: f64| {
+                        let c1 = c1.min(2.0 * r);
+                        if c0 < c1 {
+                            for (n, moment) in [0, 2, 4].into_iter().zip(&mut moments) {
+                                // ∫ (a + b c) c^(n+1) dc.
+                                let power = |k: i32| {
+                                    (libm::pow(c1, f64::from(k)) - libm::pow(c0, f64::from(k))) / f64::from(k)
+                                };
+                                *moment += a * power(n + 2) + b * power(n + 3);
+                            }
+                        }
+                    };
+                    add(0.0, rows[0].0, rows[0].1[c], 0.0);
+                    for pair in rows.windows(2) {
+                        let slope = (pair[1].1[c] - pair[0].1[c]) / (pair[1].0 - pair[0].0);
+                        add(pair[0].0, pair[1].0, pair[0].1[c] - slope * pair[0].0, slope);
+                    }
+                    let (h_one, h_two) = from_moments(r, moments[0], moments[1], moments[2]);
+                    (factors.h_one[c], factors.h_two[c]) = (h_one, h_two);
+                }
+            }
+        }
+        factors
+    }
+}
+
+/// Means of P1 and P2 of the cosine under von Mises and Fisher's distribution.
+fn mean_legendre(kappa: f64) -> (f64, f64) {
+    if kappa < 0.05 {
+        // coth κ - 1/κ and what follows from it cancel here; the next terms are κ^5 and κ^6.
+        let k2 = kappa * kappa;
+        return (kappa / 3.0 * (1.0 - k2 / 15.0), k2 / 15.0 * (1.0 - 2.0 * k2 / 21.0));
+    }
+    let e = exp(-2.0 * kappa);
+    let one = (1.0 + e) / (1.0 - e) - kappa.recip();
+    (one, 1.0 - 3.0 * one / kappa)
+}
+
+/// `∫ c^n exp(-c/d) / d dc` from 0 to `end`, by parts.
+fn exponential_moment(n: u32, d: f64, end: f64) -> f64 {
+    if end < d {
+        // By parts all digits cancel where the end is near; the power series has no such trouble.
+        let x = end / d;
+        let (mut sum, mut term) = (0.0, libm::pow(end, f64::from(n)) * x);
+        for k in 0..30u32 {
+            sum += term / f64::from(n + k + 1);
+            term *= -x / f64::from(k + 1);
+        }
+        return sum;
+    }
+    let edge = exp(-end / d);
+    let (mut moment, mut power) = (-expm1(-end / d), 1.0);
+    for k in 1..=n {
+        power *= end;
+        moment = f64::from(k) * d * moment - power * edge;
+    }
+    moment
+}
+
+/// Means of P1 and P2 of `1 - c² / 2r²` from the moments of the chord's mass.
+fn from_moments(r: f64, m0: f64, m2: f64, m4: f64) -> (f64, f64) {
+    if m0 <= 0.0 {
+        return (1.0, 1.0);
+    }
+    let (second, fourth) = (m2 / m0 / (2.0 * r * r), m4 / m0 / (4.0 * r * r * r * r));
+    let one = 1.0 - second;
+    (one, 1.5 * (1.0 - 2.0 * second + fourth) - 0.5)
+}

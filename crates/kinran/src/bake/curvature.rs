@@ -1,0 +1,454 @@
+//! Curvature of a glTF file's meshes, as a vertex attribute.
+
+use std::path::Path;
+
+use clap::ValueEnum;
+use glam::{Vec3, Vec4};
+use kinran_bake::curvature::{
+    BLUR, Curvature, Mesh, Method, Options, Packed, bake_curvature, estimated_normals, principal, uniform_scale,
+};
+use kinran_image::{Channels, Image, Pixels, write_atomically, write_exr};
+use kinran_scene::{Attribute, Document, Primitive, Scene, Skin};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::file_stem;
+use crate::values::number;
+use crate::{Console, Error};
+
+/// Flags about skin and curvature.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Skin (glTF)")]
+pub struct CurvatureArgs {
+    /// Marks a material as skin by its name, or "all"; may be given again
+    #[arg(long, value_name = "MATERIAL")]
+    pub skin: Vec<String>,
+
+    /// Which meshes get curvature tensors
+    #[arg(long, value_enum, default_value_t)]
+    pub curvature: Which,
+
+    /// How tensors are found
+    #[arg(long, value_enum, default_value_t)]
+    pub curvature_method: MethodName,
+
+    /// Curvature of the largest code, 1/mm; the default fits the mesh
+    #[arg(long, value_name = "1/MM", value_parser = |t: &str| number(t, 0.0001..=1000.0))]
+    pub curvature_range: Option<f32>,
+
+    /// Deviations of the Gaussians that blur curvature, mm, or "none" [default: 8,2.3]
+    #[arg(long, value_name = "MM,MM", value_parser = deviations)]
+    pub curvature_blur: Option<Blur>,
+
+    /// Millimetres in a unit of the file's meshes; the default is glTF's metre times the nodes' scale
+    #[arg(long, value_name = "MM", value_parser = |t: &str| number(t, 1e-6..=1e9))]
+    pub unit_mm: Option<f32>,
+
+    /// Gives meshes that have no normals smooth ones
+    #[arg(long)]
+    pub estimate_normals: bool,
+
+    /// Also writes tensors to files for other tools
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    pub curvature_dump: Option<DumpFormat>,
+}
+
+/// Which meshes get curvature.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Which {
+    /// Those with a material that is skin
+    #[default]
+    Skin,
+    /// All
+    All,
+    /// None
+    None,
+}
+
+/// How tensors are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum MethodName {
+    /// By the change of normals along edges, as in the talk
+    #[default]
+    Normals,
+    /// By fitting surfaces, for irregular and scanned meshes
+    Fit,
+}
+
+/// File format of a dump.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum DumpFormat {
+    /// NAME_curvature.json: tensor, mean, principal curvatures and direction of every vertex
+    Json,
+    /// NAME_curvature.exr: a pixel for each vertex, row by row: xx, xy, yy in RGB, mean in A
+    Exr,
+}
+
+/// Deviations in millimetres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Blur(Vec<f64>);
+
+fn deviations(text: &str) -> Result<Blur, String> {
+    if text == "none" {
+        return Ok(Blur(Vec::new()));
+    }
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse::<f64>()).collect();
+    match numbers {
+        Ok(v) if v.len() <= 4 && v.iter().all(|x| *x > 0.0 && *x <= 1e6) => Ok(Blur(v)),
+        _ => Err("write one to four positive numbers, such as 8,2.3, or none".into()),
+    }
+}
+
+/// Curvature of one mesh.
+#[derive(Clone, Debug, Serialize)]
+pub struct CurvatureReport {
+    /// The mesh.
+    pub mesh: String,
+    /// Millimetres in its unit.
+    pub millimetres: f64,
+    /// Curvature of the code 255, 1/mm.
+    pub range: f32,
+    /// Largest error of packing, 1/mm.
+    pub largest_error: f32,
+    /// Root of the mean square of packing's error, 1/mm.
+    pub rms_error: f32,
+    /// Vertices whose curvature is above the range.
+    pub clamped_vertices: usize,
+    /// What the mesh is made of, and what was skipped.
+    #[serde(flatten)]
+    pub found: kinran_bake::curvature::Report,
+}
+
+impl CurvatureReport {
+    /// A line for people.
+    pub(super) fn text(&self) -> String {
+        let remarks = self.found.remarks();
+        format!(
+            "{}: curvature of {} vertices up to {:.3}/mm, packed to within {:.4} (RMS {:.5}){}{}\n",
+            self.mesh,
+            self.found.vertices,
+            self.range,
+            self.largest_error,
+            self.rms_error,
+            if self.clamped_vertices > 0 {
+                format!(", {} above", self.clamped_vertices)
+            } else {
+                String::new()
+            },
+            if remarks.is_empty() { remarks } else { format!("; {remarks}") },
+        )
+    }
+}
+
+/// Writes smooth normals into a copy of the document where its meshes have none; gives the copy's folder, which the copy
+/// is read from.
+///
+/// # Errors
+/// Where the copy cannot be written.
+pub(super) fn with_normals(input: &Path, args: &CurvatureArgs) -> Result<Option<tempfile::TempDir>, Error> {
+    if !args.estimate_normals {
+        return Ok(None);
+    }
+    let scene = Scene::load(input)?;
+    if !scene.primitives.iter().any(|p| p.source.lacks_normals) {
+        return Ok(None);
+    }
+    let mut document = Document::open(input)?;
+    for mesh in meshes(&scene) {
+        let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
+        let surface = Joined::new(&group);
+        let normals = estimated_normals(&surface.positions, &surface.triangles);
+        for (primitive, &first) in group.iter().zip(&surface.firsts) {
+            if !primitive.source.lacks_normals {
+                continue;
+            }
+            let (m, p) = (primitive.source.mesh, primitive.source.primitive);
+            let mut at_document = vec![Vec3::Z; vertex_count(&document, m, p)];
+            for (vertex, &origin) in primitive.source.vertices.iter().enumerate() {
+                at_document[origin as usize] = normals[first + vertex].normalize_or(Vec3::Z);
+            }
+            document.set_attribute(m, p, "NORMAL", Attribute::Float3(&at_document));
+        }
+    }
+    let folder = tempfile::tempdir().map_err(|e| kinran_image::Error::io(input, e))?;
+    document.write(folder.path().join(super::file_name(input)))?;
+    Ok(Some(folder))
+}
+
+/// Marks materials as skin.
+///
+/// # Errors
+/// Where a name is none of the materials'.
+pub(super) fn mark_skin(args: &CurvatureArgs, scene: &mut Scene, document: &mut Document) -> Result<(), Error> {
+    for name in &args.skin {
+        let chosen: Vec<usize> = (0..document.material_count().min(scene.materials.len()))
+            .filter(|&i| name == "all" || scene.materials[i].name == *name)
+            .collect();
+        if chosen.is_empty() {
+            let names: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
+            return Err(Error::Usage(format!(
+                "--skin {name}: there is no such material; there are {}",
+                names.join(", ")
+            )));
+        }
+        for i in chosen {
+            scene.materials[i].skin.get_or_insert_with(Skin::default);
+            let extensions = document.material_mut(i).entry("extensions").or_insert_with(|| json!({}));
+            if let Some(extensions) = extensions.as_object_mut() {
+                extensions.entry("KINRAN_materials_skin").or_insert_with(|| json!({}));
+            }
+            document.use_extension("KINRAN_materials_skin", false);
+        }
+    }
+    Ok(())
+}
+
+/// Bakes curvature into the document's meshes.
+///
+/// # Errors
+/// Where a mesh is none, or has no normals.
+pub(super) fn bake(
+    args: &super::Args,
+    console: &Console,
+    scene: &Scene,
+    document: &mut Document,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<CurvatureReport>, Error> {
+    let flags = &args.curvature;
+    let wanted = |p: &Primitive| match flags.curvature {
+        Which::Skin => scene.materials[p.material].skin.is_some(),
+        Which::All => true,
+        Which::None => false,
+    };
+    let mut reports = Vec::new();
+    let groups: Vec<Vec<usize>> = meshes(scene)
+        .into_iter()
+        .filter(|mesh| mesh.iter().any(|&i| wanted(&scene.primitives[i])))
+        .collect();
+    let stage = console.progress().stage("curvature", groups.len() as u64);
+    for mesh in groups {
+        let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
+        let name = mesh_name(document, group[0].source.mesh);
+        let at_fault = |reason: String| Error::Usage(format!("{}: {name}: {reason}", args.input.display()));
+        if let Some(flat) = group.iter().find(|p| p.source.lacks_normals) {
+            return Err(at_fault(format!(
+                "primitive {} has no NORMAL, which glTF draws flat, and curvature needs smooth normals; export them, \
+                 or add --estimate-normals",
+                flat.source.primitive
+            )));
+        }
+        let surface = Joined::new(&group);
+        let millimetres =
+            flags.unit_mm.map_or_else(|| unit(scene, &mesh, &name, warnings), f64::from);
+        let options = Options {
+            method: match flags.curvature_method {
+                MethodName::Normals => Method::Normals,
+                MethodName::Fit => Method::Fit,
+            },
+            millimetres,
+            blur: flags.curvature_blur.as_ref().map_or_else(|| BLUR.to_vec(), |blur| blur.0.clone()),
+            clamp: true,
+        };
+        let baked = bake_curvature(
+            &Mesh {
+                positions: &surface.positions,
+                normals: Some(&surface.normals),
+                tangents: Some(&surface.tangents),
+                triangles: &surface.triangles,
+            },
+            &options,
+        )
+        .map_err(|e| at_fault(e.to_string()))?;
+        let packed = baked.pack(flags.curvature_range.unwrap_or_else(|| baked.fitting_range()));
+        for (primitive, &first) in group.iter().zip(&surface.firsts) {
+            if wanted(primitive) {
+                put(document, primitive, first, &packed)?;
+            }
+        }
+        document.use_extension("KINRAN_mesh_curvature", false);
+        if let Some(format) = flags.curvature_dump {
+            dump(args, &name, format, &baked, &surface)?;
+        }
+        reports.push(CurvatureReport {
+            mesh: name,
+            millimetres,
+            range: packed.range,
+            largest_error: packed.largest_error,
+            rms_error: packed.rms_error,
+            clamped_vertices: packed.clamped,
+            found: baked.report,
+        });
+        stage.add(1);
+    }
+    Ok(reports)
+}
+
+/// The scene's primitives of each mesh, in the document's order.
+fn meshes(scene: &Scene) -> Vec<Vec<usize>> {
+    let mut meshes: Vec<Vec<usize>> = Vec::new();
+    for (i, primitive) in scene.primitives.iter().enumerate() {
+        match meshes.last_mut() {
+            Some(last) if scene.primitives[last[0]].source.mesh == primitive.source.mesh => last.push(i),
+            _ => meshes.push(vec![i]),
+        }
+    }
+    meshes
+}
+
+/// Primitives as one surface.
+struct Joined {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    tangents: Vec<Vec4>,
+    triangles: Vec<[u32; 3]>,
+    /// Each primitive's first vertex.
+    firsts: Vec<usize>,
+}
+
+impl Joined {
+    fn new(group: &[&Primitive]) -> Self {
+        let mut joined = Joined {
+            positions: Vec::new(),
+            normals: Vec::new(),
+            tangents: Vec::new(),
+            triangles: Vec::new(),
+            firsts: Vec::new(),
+        };
+        for primitive in group {
+            let first = joined.positions.len();
+            joined.firsts.push(first);
+            joined.positions.extend(&primitive.positions);
+            joined.normals.extend(&primitive.normals);
+            joined.tangents.extend(&primitive.tangents);
+            joined.triangles.extend(primitive.triangles.iter().map(|t| t.map(|i| i + first as u32)));
+        }
+        joined
+    }
+}
+
+/// Millimetres in a mesh's unit: a metre times the scale of where it stands.
+fn unit(scene: &Scene, mesh: &[usize], name: &str, warnings: &mut Vec<String>) -> f64 {
+    let placed = scene.instances.iter().filter(|i| mesh.contains(&i.primitive));
+    let scales: Vec<(f64, bool)> = placed
+        .map(|i| {
+            let m = i.transform.matrix3;
+            uniform_scale([m.x_axis.into(), m.y_axis.into(), m.z_axis.into()])
+        })
+        .collect();
+    let largest = scales.iter().map(|s| s.0).fold(0.0, f64::max);
+    let smallest = scales.iter().map(|s| s.0).fold(f64::INFINITY, f64::min);
+    if scales.iter().any(|s| !s.1) {
+        warnings.push(format!("{name} is stretched by its node; curvature is that of the mesh, not of its picture"));
+    }
+    if largest > 1.01 * smallest {
+        warnings.push(format!(
+            "{name} stands at several sizes; curvature is that of the largest, --unit-mm sets another"
+        ));
+    }
+    1000.0 * if largest > 0.0 { largest } else { 1.0 }
+}
+
+fn mesh_name(document: &Document, mesh: usize) -> String {
+    let name = document.json().get("meshes").and_then(|m| m.get(mesh)?.get("name")?.as_str());
+    name.filter(|n| !n.is_empty()).map_or_else(|| format!("mesh {mesh}"), str::to_owned)
+}
+
+/// Vertices of the document's primitive.
+fn vertex_count(document: &Document, mesh: usize, primitive: usize) -> usize {
+    let position = document
+        .json()
+        .get("meshes")
+        .and_then(|m| m.get(mesh)?.get("primitives")?.get(primitive)?.get("attributes")?.get("POSITION")?.as_u64());
+    let count = position
+        .and_then(|accessor| document.json().get("accessors")?.get(accessor as usize)?.get("count")?.as_u64());
+    count.unwrap_or(0) as usize
+}
+
+/// Writes tangents, if they were missing, and codes into the document's primitive. Where tangents split vertices, the
+/// primitive gets new ones.
+fn put(document: &mut Document, primitive: &Primitive, first: usize, packed: &Packed) -> Result<(), Error> {
+    let source = &primitive.source;
+    let (mesh, number) = (source.mesh, source.primitive);
+    let codes = &packed.bytes[first..first + primitive.positions.len()];
+    let mut count = vertex_count(document, mesh, number);
+    let mut place: Vec<usize> = source.vertices.iter().map(|&v| v as usize).collect();
+    if place.is_empty() {
+        place = (0..count).collect();
+    }
+    let mut taken = vec![false; count];
+    let split = place.iter().any(|&v| std::mem::replace(&mut taken[v], true));
+    if split {
+        document.gather_vertices(mesh, number, &source.vertices, &primitive.triangles)?;
+        count = primitive.positions.len();
+        place = (0..count).collect();
+    }
+    let mut bytes = vec![[0u8, 128, 0, 0]; count];
+    let mut tangents = vec![Vec4::new(1.0, 0.0, 0.0, 1.0); count];
+    for (vertex, &at) in place.iter().enumerate() {
+        bytes[at] = codes[vertex];
+        tangents[at] = primitive.tangents[vertex];
+    }
+    if source.lacks_tangents {
+        document.set_attribute(mesh, number, "TANGENT", Attribute::Float4(&tangents));
+    }
+    document.set_attribute(mesh, number, "_CURVATURE", Attribute::Byte4(&bytes));
+    let extensions = document.primitive_mut(mesh, number).entry("extensions").or_insert_with(|| json!({}));
+    if let Some(extensions) = extensions.as_object_mut() {
+        extensions.insert("KINRAN_mesh_curvature".into(), json!({ "range": packed.range }));
+    }
+    Ok(())
+}
+
+/// Pixels in a row of an EXR dump.
+const DUMP_WIDTH: usize = 1024;
+
+fn dump(
+    args: &super::Args,
+    name: &str,
+    format: DumpFormat,
+    baked: &Curvature,
+    surface: &Joined,
+) -> Result<(), Error> {
+    let stem = args.input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    let path = |extension: &str| args.output.join(format!("{stem}_{}_curvature.{extension}", file_stem(name)));
+    match format {
+        DumpFormat::Exr => {
+            let height = baked.tensors.len().div_ceil(DUMP_WIDTH);
+            let mut samples: Vec<f32> =
+                baked.tensors.iter().flat_map(|t| [t.xx, t.xy, t.yy, 0.5 * t.trace()]).collect();
+            samples.resize(DUMP_WIDTH * height * 4, 0.0);
+            let pixels = Pixels::F32(samples);
+            let image = Image::new(DUMP_WIDTH as u32, height as u32, Channels::Rgba, pixels)?;
+            write_exr(&path("exr"), &image)?;
+        }
+        DumpFormat::Json => {
+            let vertices: Vec<Value> = (baked.tensors.iter().enumerate())
+                .map(|(i, t)| {
+                    let (k1, k2, [x, y]) = principal(*t);
+                    let (n, tangent) = (surface.normals[i], baked.tangents[i]);
+                    let along = tangent.truncate();
+                    let direction = x * along + y * tangent.w * n.cross(along);
+                    json!({
+                        "position": surface.positions[i].to_array(),
+                        "normal": n.to_array(),
+                        "tangent": tangent.to_array(),
+                        "tensor": [t.xx, t.xy, t.yy],
+                        "mean": 0.5 * t.trace(),
+                        "principal": [k1, k2],
+                        "direction": direction.to_array(),
+                    })
+                })
+                .collect();
+            let text = json!({
+                "unit": "1/mm",
+                "mesh": name,
+                "primitives": surface.firsts,
+                "vertices": vertices,
+                "triangles": surface.triangles,
+            });
+            let text = serde_json::to_vec(&text).map_err(|e| Error::Internal(e.to_string()))?;
+            write_atomically(&path("json"), &text)?;
+        }
+    }
+    Ok(())
+}
