@@ -1559,3 +1559,133 @@ GgxSurface ggx_from_sggx(mat3 s, vec3 mean_normal) {
 }
 
 #endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/skin_curvature.wesl, by ./x shaders. Needs: sym
+
+// The curvature tensor of a vertex: four bytes, and the curvature towards a light.
+//
+// Curvature is 1/mm, convex is positive. A tensor is (xx, xy, yy) in the frame of the mesh's tangent and bitangent.
+// Four bytes are a normalised vertex attribute; interpolate it as it is and decode in the pixel: means of codes
+// decode to tensors without negative curvature.
+
+#ifndef KINRAN_SKIN_CURVATURE_GLSL
+#define KINRAN_SKIN_CURVATURE_GLSL
+
+
+/// The largest curvature that four bytes hold where nothing else is said, 1/mm: a radius of 2 mm.
+const float CURVATURE_RANGE = 0.5;
+
+/// Four numbers from 0 to 1 for a positive semi-definite `tensor` and a `mean` curvature, both up to `range`:
+/// `sqrt(xx), rho, sqrt(yy), sqrt(mean)`, where `rho = xy / sqrt(xx yy)` is stored as `(127 rho + 128) / 255`, so that a
+/// byte holds zero exactly.
+///
+/// Cost on GCN: 19 instructions (6 at a quarter of the rate).
+vec4 curvature_encode(vec3 tensor, float mean, float range) {
+    float inverse_ = 1.0 / range;
+    float xx = max(tensor.x, 0.0);
+    float yy = max(tensor.z, 0.0);
+    float product = sqrt((xx * yy));
+    float rho = (product > 0.0) ? clamp((tensor.y / product), -1.0, 1.0) : 0.0;
+    vec3 roots = sqrt(clamp((vec3(xx, yy, mean) * inverse_), vec3(0.0), vec3(1.0)));
+    return vec4(roots.x, (((127.0 * rho) + 128.0) / 255.0), roots.y, roots.z);
+}
+
+/// Tensor (xyz) and mean curvature (w), 1/mm, from the four numbers of `curvature_encode`.
+///
+/// Cost on GCN: 10 instructions.
+vec4 curvature_decode(vec4 texel, float range) {
+    float rho = (texel.y * 2.007874) - 1.007874;
+    float a = range * texel.x;
+    float b = texel.z;
+    return vec4((a * texel.x), ((a * b) * rho), ((range * b) * b), ((range * texel.w) * texel.w));
+}
+
+/// The curvature towards a light, 1/mm (slide: Skin Shading | Implementation, CurvatureFromLight): the tensor along the
+/// light's tangent and bitangent components `u_tb`, not normalised. It is the directional curvature times the squared
+/// sine between normal and light: right at the terminator, less towards the light, where the table hardly varies.
+///
+/// Cost on GCN: 7 instructions.
+float curvature_from_light(vec3 tensor, vec2 u_tb) {
+    float _e2 = sym2_quadratic(tensor, u_tb);
+    return _e2;
+}
+
+/// The curvature in the direction of the light's projection on the tangent plane, 1/mm: `curvature_from_light` over the
+/// squared length of `u_tb`. Where the light stands in the normal there is no direction, and within some 1e-3 rad of it
+/// the result goes over to the mean.
+///
+/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
+float curvature_from_light_normalized(vec3 tensor, vec2 u_tb) {
+    float _e2 = sym2_quadratic(tensor, u_tb);
+    float _e3 = sym2_trace(tensor);
+    return (_e2 + (5e-7 * _e3)) / (dot(u_tb, u_tb) + 1e-6);
+}
+
+#endif
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/skin_lighting.wesl, by ./x shaders. Needs: ggx, sh
+
+// Light on skin: where to look into the tables, ambient light, gloss, and normals by channel.
+//
+// - Penner, Borshukov. Pre-Integrated Skin Shading. GPU Pro 2, 2011.
+//
+// A punctual light: `color += base / π * irradiance * table(skin_lut_uv(n·u, curvature, 1 / range)).rgb`, where n·u is
+// not clamped, irradiance is the light's at normal incidence, and curvature is `curvature_from_light` of the light's
+// tangent and bitangent components. Translucency is yours to add there: a term for light from behind belongs to this sum
+// and needs nothing else from these functions.
+
+#ifndef KINRAN_SKIN_LIGHTING_GLSL
+#define KINRAN_SKIN_LIGHTING_GLSL
+
+
+/// How far the normals of red, green and blue turn from the normal map's towards the mesh's (Penner 2011, section 1.4,
+/// who leaves the numbers to the eye): the share of each channel's light that leaves farther than a pore is wide.
+const vec3 SKIN_NORMAL_BLUR = vec3(0.667, 0.209, 0.007);
+
+/// Where the table of punctual light has its value for `n_u`, the unclamped cosine between normal and light, and a
+/// curvature: x from the dark to the lit side, y from flat to `1 / inverse_range`. Sample with linear filtering and
+/// clamped edges.
+///
+/// Cost on GCN: 2 instructions.
+vec2 skin_lut_uv(float n_u, float curvature, float inverse_range) {
+    return vec2(((0.5 * n_u) + 0.5), (curvature * inverse_range));
+}
+
+/// Irradiance of skin under ambient light: `sh_irradiance` with bands 1 and 2 multiplied, for each channel, by what the
+/// profile leaves of them at the mean curvature. Clamp what rings below zero.
+///
+/// Cost on GCN: 53 instructions.
+vec3 skin_irradiance(vec3 radiance[9], vec3 normal, vec3 h_one, vec3 h_two) {
+    float _e4[9] = sh_basis(normal);
+    vec3 one = ((radiance[1] * _e4[1]) + (radiance[2] * _e4[2])) + (radiance[3] * _e4[3]);
+    vec3 two = ((((radiance[4] * _e4[4]) + (radiance[5] * _e4[5])) + (radiance[6] * _e4[6])) + (radiance[7] * _e4[7])) + (radiance[8] * _e4[8]);
+    return (((3.1415927 * _e4[0]) * radiance[0]) + ((2.0943952 * h_one) * one)) + ((0.7853982 * h_two) * two);
+}
+
+/// The gloss of skin, without Fresnel's term: distribution times visibility of two GGX lobes, `alpha_one` with the weight
+/// `1 - share` and `alpha_two` with `share`. One lobe is too tight at its foot or too wide at its top.
+///
+/// Cost on GCN: 40 instructions (8 at a quarter of the rate).
+float skin_specular(float n_h, float n_u, float n_v, float alpha_one, float alpha_two, float share) {
+    float _e6 = ggx_d(n_h, alpha_one);
+    float _e7 = smith_v(n_u, n_v, alpha_one);
+    float one = _e6 * _e7;
+    float _e9 = ggx_d(n_h, alpha_two);
+    float _e10 = smith_v(n_u, n_v, alpha_two);
+    float two = _e9 * _e10;
+    return one + (share * (two - one));
+}
+
+/// The normal of one channel: from the normal map's `n` towards the mesh's `n_mesh` by `blur`, 0 to 1
+/// (SKIN_NORMAL_BLUR). Gloss keeps `n`.
+///
+/// Cost on GCN: 13 instructions (1 at a quarter of the rate).
+vec3 skin_normal(vec3 n, vec3 n_mesh, float blur) {
+    return normalize((n + (blur * (n_mesh - n))));
+}
+
+#endif

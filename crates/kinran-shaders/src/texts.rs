@@ -64,6 +64,12 @@ pub mod wesl {
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../src/sggx.wesl");
 
+    /// The module `skin_curvature`.
+    pub const SKIN_CURVATURE: &str = include_str!("../src/skin_curvature.wesl");
+
+    /// The module `skin_lighting`.
+    pub const SKIN_LIGHTING: &str = include_str!("../src/skin_lighting.wesl");
+
     /// The modules, each after those it needs.
     pub const MODULES: &[Module] = &[
         Module { name: "beckmann", text: BECKMANN, needs: &[] },
@@ -85,6 +91,8 @@ pub mod wesl {
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+        Module { name: "skin_curvature", text: SKIN_CURVATURE, needs: &["sym"] },
+        Module { name: "skin_lighting", text: SKIN_LIGHTING, needs: &["ggx", "sh"] },
     ];
 }
 
@@ -152,6 +160,12 @@ pub mod wgsl {
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../wgsl/sggx.wgsl");
 
+    /// The module `skin_curvature`.
+    pub const SKIN_CURVATURE: &str = include_str!("../wgsl/skin_curvature.wgsl");
+
+    /// The module `skin_lighting`.
+    pub const SKIN_LIGHTING: &str = include_str!("../wgsl/skin_lighting.wgsl");
+
     /// All modules in one text.
     pub const ALL: &str = include_str!("../wgsl/kinran.wgsl");
 
@@ -176,6 +190,8 @@ pub mod wgsl {
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+        Module { name: "skin_curvature", text: SKIN_CURVATURE, needs: &["sym"] },
+        Module { name: "skin_lighting", text: SKIN_LIGHTING, needs: &["ggx", "sh"] },
     ];
 }
 
@@ -243,6 +259,12 @@ pub mod glsl_450 {
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../glsl_450/sggx.glsl");
 
+    /// The module `skin_curvature`.
+    pub const SKIN_CURVATURE: &str = include_str!("../glsl_450/skin_curvature.glsl");
+
+    /// The module `skin_lighting`.
+    pub const SKIN_LIGHTING: &str = include_str!("../glsl_450/skin_lighting.glsl");
+
     /// All modules in one text.
     pub const ALL: &str = include_str!("../glsl_450/kinran.glsl");
 
@@ -267,6 +289,8 @@ pub mod glsl_450 {
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+        Module { name: "skin_curvature", text: SKIN_CURVATURE, needs: &["sym"] },
+        Module { name: "skin_lighting", text: SKIN_LIGHTING, needs: &["ggx", "sh"] },
     ];
 }
 
@@ -334,6 +358,12 @@ pub mod glsl_es_300 {
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../glsl_es_300/sggx.glsl");
 
+    /// The module `skin_curvature`.
+    pub const SKIN_CURVATURE: &str = include_str!("../glsl_es_300/skin_curvature.glsl");
+
+    /// The module `skin_lighting`.
+    pub const SKIN_LIGHTING: &str = include_str!("../glsl_es_300/skin_lighting.glsl");
+
     /// All modules in one text.
     pub const ALL: &str = include_str!("../glsl_es_300/kinran.glsl");
 
@@ -358,6 +388,8 @@ pub mod glsl_es_300 {
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+        Module { name: "skin_curvature", text: SKIN_CURVATURE, needs: &["sym"] },
+        Module { name: "skin_lighting", text: SKIN_LIGHTING, needs: &["ggx", "sh"] },
     ];
 }
 
@@ -425,6 +457,12 @@ pub mod hlsl {
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../hlsl/sggx.hlsl");
 
+    /// The module `skin_curvature`.
+    pub const SKIN_CURVATURE: &str = include_str!("../hlsl/skin_curvature.hlsl");
+
+    /// The module `skin_lighting`.
+    pub const SKIN_LIGHTING: &str = include_str!("../hlsl/skin_lighting.hlsl");
+
     /// All modules in one text.
     pub const ALL: &str = include_str!("../hlsl/kinran.hlsl");
 
@@ -449,6 +487,8 @@ pub mod hlsl {
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+        Module { name: "skin_curvature", text: SKIN_CURVATURE, needs: &["sym"] },
+        Module { name: "skin_lighting", text: SKIN_LIGHTING, needs: &["ggx", "sh"] },
     ];
 }
 
@@ -516,6 +556,12 @@ pub mod msl {
     /// The module `sggx`.
     pub const SGGX: &str = include_str!("../msl/sggx.h");
 
+    /// The module `skin_curvature`.
+    pub const SKIN_CURVATURE: &str = include_str!("../msl/skin_curvature.h");
+
+    /// The module `skin_lighting`.
+    pub const SKIN_LIGHTING: &str = include_str!("../msl/skin_lighting.h");
+
     /// All modules in one text.
     pub const ALL: &str = include_str!("../msl/kinran.h");
 
@@ -540,5 +586,7 @@ pub mod msl {
         Module { name: "ggx", text: GGX, needs: &["sym"] },
         Module { name: "fuzz_sampling", text: FUZZ_SAMPLING, needs: &["fuzz_phase", "ggx"] },
         Module { name: "sggx", text: SGGX, needs: &["frame", "sym"] },
+        Module { name: "skin_curvature", text: SKIN_CURVATURE, needs: &["sym"] },
+        Module { name: "skin_lighting", text: SKIN_LIGHTING, needs: &["ggx", "sh"] },
     ];
 }

@@ -1492,3 +1492,115 @@ fn ggx_from_sggx(s: mat3x3f, mean_normal: vec3f) -> GgxSurface {
     let surface = ggx_from_sggx_unclamped(s, mean_normal);
     return GgxSurface(surface.normal, sym2_clamp_eigen(surface.a, 0.0, 1.0));
 }
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/skin_curvature.wesl, by ./x shaders. Needs: sym
+
+// The curvature tensor of a vertex: four bytes, and the curvature towards a light.
+//
+// Curvature is 1/mm, convex is positive. A tensor is (xx, xy, yy) in the frame of the mesh's tangent and bitangent.
+// Four bytes are a normalised vertex attribute; interpolate it as it is and decode in the pixel: means of codes
+// decode to tensors without negative curvature.
+
+/// The largest curvature that four bytes hold where nothing else is said, 1/mm: a radius of 2 mm.
+const CURVATURE_RANGE: f32 = 0.5;
+
+/// Four numbers from 0 to 1 for a positive semi-definite `tensor` and a `mean` curvature, both up to `range`:
+/// `sqrt(xx), rho, sqrt(yy), sqrt(mean)`, where `rho = xy / sqrt(xx yy)` is stored as `(127 rho + 128) / 255`, so that a
+/// byte holds zero exactly.
+///
+/// Cost on GCN: 19 instructions (6 at a quarter of the rate).
+fn curvature_encode(tensor: vec3f, mean: f32, range: f32) -> vec4f {
+    let inverse = 1.0 / range;
+    let xx = max(tensor.x, 0.0);
+    let yy = max(tensor.z, 0.0);
+    let product = sqrt(xx * yy);
+    let rho = select(0.0, clamp(tensor.y / product, -1.0, 1.0), product > 0.0);
+    let roots = sqrt(saturate(vec3f(xx, yy, mean) * inverse));
+    return vec4f(roots.x, (127.0 * rho + 128.0) / 255.0, roots.y, roots.z);
+}
+
+/// Tensor (xyz) and mean curvature (w), 1/mm, from the four numbers of `curvature_encode`.
+///
+/// Cost on GCN: 10 instructions.
+fn curvature_decode(texel: vec4f, range: f32) -> vec4f {
+    let rho = texel.y * 2.0078740157480315 - 1.0078740157480315;
+    let a = range * texel.x;
+    let b = texel.z;
+    return vec4f(a * texel.x, a * b * rho, range * b * b, range * texel.w * texel.w);
+}
+
+/// The curvature towards a light, 1/mm (slide: Skin Shading | Implementation, CurvatureFromLight): the tensor along the
+/// light's tangent and bitangent components `u_tb`, not normalised. It is the directional curvature times the squared
+/// sine between normal and light: right at the terminator, less towards the light, where the table hardly varies.
+///
+/// Cost on GCN: 7 instructions.
+fn curvature_from_light(tensor: vec3f, u_tb: vec2f) -> f32 {
+    return sym2_quadratic(tensor, u_tb);
+}
+
+/// The curvature in the direction of the light's projection on the tangent plane, 1/mm: `curvature_from_light` over the
+/// squared length of `u_tb`. Where the light stands in the normal there is no direction, and within some 1e-3 rad of it
+/// the result goes over to the mean.
+///
+/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
+fn curvature_from_light_normalized(tensor: vec3f, u_tb: vec2f) -> f32 {
+    return (sym2_quadratic(tensor, u_tb) + 5e-7 * sym2_trace(tensor)) / (dot(u_tb, u_tb) + 1e-6);
+}
+
+// Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
+// Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
+// Made from src/skin_lighting.wesl, by ./x shaders. Needs: ggx, sh
+
+// Light on skin: where to look into the tables, ambient light, gloss, and normals by channel.
+//
+// - Penner, Borshukov. Pre-Integrated Skin Shading. GPU Pro 2, 2011.
+//
+// A punctual light: `color += base / π * irradiance * table(skin_lut_uv(n·u, curvature, 1 / range)).rgb`, where n·u is
+// not clamped, irradiance is the light's at normal incidence, and curvature is `curvature_from_light` of the light's
+// tangent and bitangent components. Translucency is yours to add there: a term for light from behind belongs to this sum
+// and needs nothing else from these functions.
+
+/// How far the normals of red, green and blue turn from the normal map's towards the mesh's (Penner 2011, section 1.4,
+/// who leaves the numbers to the eye): the share of each channel's light that leaves farther than a pore is wide.
+const SKIN_NORMAL_BLUR: vec3f = vec3f(0.667, 0.209, 0.007);
+
+/// Where the table of punctual light has its value for `n_u`, the unclamped cosine between normal and light, and a
+/// curvature: x from the dark to the lit side, y from flat to `1 / inverse_range`. Sample with linear filtering and
+/// clamped edges.
+///
+/// Cost on GCN: 2 instructions.
+fn skin_lut_uv(n_u: f32, curvature: f32, inverse_range: f32) -> vec2f {
+    return vec2f(0.5 * n_u + 0.5, curvature * inverse_range);
+}
+
+/// Irradiance of skin under ambient light: `sh_irradiance` with bands 1 and 2 multiplied, for each channel, by what the
+/// profile leaves of them at the mean curvature. Clamp what rings below zero.
+///
+/// Cost on GCN: 53 instructions.
+fn skin_irradiance(radiance: array<vec3f, 9>, normal: vec3f, h_one: vec3f, h_two: vec3f) -> vec3f {
+    let basis = sh_basis(normal);
+    let one = radiance[1] * basis[1] + radiance[2] * basis[2] + radiance[3] * basis[3];
+    let two = radiance[4] * basis[4] + radiance[5] * basis[5] + radiance[6] * basis[6] + radiance[7] * basis[7]
+        + radiance[8] * basis[8];
+    return 3.14159265 * basis[0] * radiance[0] + 2.09439510 * h_one * one + 0.78539816 * h_two * two;
+}
+
+/// The gloss of skin, without Fresnel's term: distribution times visibility of two GGX lobes, `alpha_one` with the weight
+/// `1 - share` and `alpha_two` with `share`. One lobe is too tight at its foot or too wide at its top.
+///
+/// Cost on GCN: 40 instructions (8 at a quarter of the rate).
+fn skin_specular(n_h: f32, n_u: f32, n_v: f32, alpha_one: f32, alpha_two: f32, share: f32) -> f32 {
+    let one = ggx_d(n_h, alpha_one) * smith_v(n_u, n_v, alpha_one);
+    let two = ggx_d(n_h, alpha_two) * smith_v(n_u, n_v, alpha_two);
+    return one + share * (two - one);
+}
+
+/// The normal of one channel: from the normal map's `n` towards the mesh's `n_mesh` by `blur`, 0 to 1
+/// (SKIN_NORMAL_BLUR). Gloss keeps `n`.
+///
+/// Cost on GCN: 13 instructions (1 at a quarter of the rate).
+fn skin_normal(n: vec3f, n_mesh: vec3f, blur: f32) -> vec3f {
+    return normalize(n + blur * (n_mesh - n));
+}

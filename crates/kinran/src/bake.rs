@@ -1,5 +1,6 @@
 //! `kinran bake`: engine-ready textures from a folder of maps or a glTF file.
 
+mod curvature;
 mod folder;
 mod gltf;
 mod report;
@@ -18,6 +19,7 @@ use crate::outputs::{check_folder, has_extension};
 use crate::values::{filter, number};
 use crate::{Console, Error};
 
+pub use curvature::{CurvatureArgs, CurvatureReport};
 pub use folder::bake_folder;
 pub use gltf::bake_gltf;
 pub use report::{Input, Output, Report, SurfaceReport};
@@ -133,6 +135,10 @@ pub struct Args {
     /// Believe that a normal map is one, whatever its texels look like
     #[arg(long)]
     pub force_normal: bool,
+
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub curvature: CurvatureArgs,
 
     /// Only say what was understood
     #[arg(long)]

@@ -16,6 +16,7 @@ pub mod picture;
 mod progress;
 pub mod render;
 pub mod shaders;
+pub mod skin;
 pub mod skin_lut;
 pub mod surfaces;
 mod table;

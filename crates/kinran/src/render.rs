@@ -7,6 +7,7 @@ use kinran_render::reference::{Film, RenderScene, TextureFiltering};
 use kinran_scene::Scene;
 use serde::Serialize;
 
+use crate::skin::missing_curvature;
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::values::filter;
 use crate::view::{View, ViewArgs, file_name};
@@ -107,7 +108,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
     let progress = console.progress();
     let (surfaces, apart) = scene_surfaces(&scene, args.filter, &progress)?;
-    let warnings: Vec<String> = scene.warnings.iter().cloned().chain(apart).collect();
+    let warnings: Vec<String> =
+        scene.warnings.iter().cloned().chain(apart).chain(missing_curvature(&scene)).collect();
     warnings.iter().for_each(|w| console.warn(w));
 
     let filtering = match args.filter {

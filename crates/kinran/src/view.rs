@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, ValueEnum};
 use glam::{Affine3A, Mat3, Vec3};
 use kinran_render::reference::{
-    Background, Film, RenderScene, Settings, SurfaceTextures, TextureFiltering, look_at, render,
+    Background, Film, RenderScene, Settings, SkinCurvature, SurfaceTextures, TextureFiltering, look_at,
+    render,
 };
 use kinran_render::tonemap::{Tonemap, to_srgb8};
 use kinran_scene::{Camera, Environment, Light, LightKind, Scene};
 
+use crate::skin::{SkinCurvatureName, attach_skin};
 use crate::values::{direction, number, size, vector};
 use crate::{Error, Progress};
 
@@ -76,6 +78,10 @@ pub struct ViewArgs {
     /// The tone curve of pictures for displays; EXR files are linear and not exposed
     #[arg(long, value_enum, default_value_t = Curve::Aces)]
     pub tonemap: Curve,
+
+    /// Which curvature materials that are skin are lit with
+    #[arg(long, value_enum, default_value_t)]
+    pub skin_curvature: SkinCurvatureName,
 }
 
 /// Where light from all around comes from.
@@ -123,6 +129,8 @@ pub struct View {
     pub exposure: f32,
     /// Tone curve.
     pub tonemap: Tonemap,
+    /// Which curvature skin is lit with.
+    pub skin_curvature: SkinCurvature,
 }
 
 /// Radiance behind models where no environment's file is given; chosen by eye.
@@ -204,6 +212,7 @@ impl View {
                 Curve::Agx => Tonemap::AgX,
                 Curve::None => Tonemap::None,
             },
+            skin_curvature: args.skin_curvature.into(),
         };
         Ok(View { camera: view.camera_at(args.distance), ..view })
     }
@@ -235,6 +244,7 @@ impl View {
     pub fn scene(&self, scene: &Scene, surfaces: Vec<Option<SurfaceTextures>>) -> Result<RenderScene, Error> {
         let mut prepared = RenderScene::new(scene, surfaces, self.environment.clone())?;
         prepared.lights.clone_from(&self.lights);
+        attach_skin(scene, &mut prepared, self.skin_curvature)?;
         Ok(prepared)
     }
 

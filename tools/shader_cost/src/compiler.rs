@@ -70,10 +70,12 @@ impl Compiler {
             let executables = ash::khr::pipeline_executable_properties::Device::new(&instance, &device);
 
             let binding = |i: u32| {
-                let kind = if i < STORAGE_BUFFERS {
-                    vk::DescriptorType::STORAGE_BUFFER
-                } else {
-                    vk::DescriptorType::UNIFORM_BUFFER
+                // After the buffers a texture and its sampler.
+                let kind = match i.checked_sub(STORAGE_BUFFERS) {
+                    None => vk::DescriptorType::STORAGE_BUFFER,
+                    Some(0) => vk::DescriptorType::UNIFORM_BUFFER,
+                    Some(1) => vk::DescriptorType::SAMPLED_IMAGE,
+                    Some(_) => vk::DescriptorType::SAMPLER,
                 };
                 vk::DescriptorSetLayoutBinding::default()
                     .binding(i)
@@ -81,7 +83,7 @@ impl Compiler {
                     .descriptor_type(kind)
                     .stage_flags(vk::ShaderStageFlags::COMPUTE)
             };
-            let bindings: Vec<_> = (0..=STORAGE_BUFFERS).map(binding).collect();
+            let bindings: Vec<_> = (0..=STORAGE_BUFFERS + 2).map(binding).collect();
             let set = device.create_descriptor_set_layout(
                 &vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings),
                 None,

@@ -233,6 +233,27 @@ pub(crate) fn rows() -> Vec<Row> {
             &[under, ambient_ours],
         ),
     ]);
+
+    // Skin reads its table from a texture; codes of curvature come as a vertex leaves them.
+    let curved = "
+    let t = normalize(pixel.tangent);
+    let b = pixel.bitangent;
+    let curvature = curvature_decode(vec4f(pixel.texel, pixel.alphas.x), pixel.alphas.y);";
+    let by_mean = "
+        let at = skin_lut_uv(dot(n, u), curvature.w, 2.0);";
+    let by_direction = "
+        let along = curvature_from_light(curvature.xyz, vec2f(dot(t, u), dot(b, u)));
+        let at = skin_lut_uv(dot(n, u), along, 2.0);";
+    let normalized = "
+        let along = curvature_from_light_normalized(curvature.xyz, vec2f(dot(t, u), dot(b, u)));
+        let at = skin_lut_uv(dot(n, u), along, 2.0);";
+    let scattered = "pixel.base * textureSampleLevel(table, clamped, at, 0.0).rgb";
+    let skin_row = |id, title, light: &str| fuzz_row(id, title, &[curved], &[light], scattered, &[]);
+    rows.extend([
+        skin_row("skin_mean", "skin with mean curvature", by_mean),
+        skin_row("skin", "**skin with directional curvature**", by_direction),
+        skin_row("skin_normalized", "skin with normalised directional curvature", normalized),
+    ]);
     rows
 }
 
@@ -267,6 +288,8 @@ struct Pixel {{ n: vec3f, v: vec3f, tangent: vec3f, bitangent: vec3f, texel: vec
 @group(0) @binding(0) var<storage, read> pixels: array<Pixel>;
 @group(0) @binding(1) var<storage, read_write> colors: array<vec4f>;
 @group(0) @binding(2) var<uniform> scene: Scene;
+@group(0) @binding(3) var table: texture_2d<f32>;
+@group(0) @binding(4) var clamped: sampler;
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) i: u32) {{
     let pixel = pixels[i];

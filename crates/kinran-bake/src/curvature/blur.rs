@@ -180,7 +180,7 @@ impl Average {
             |(band, (over, sum))| {
                 for (i, (over, sum)) in over.iter_mut().zip(sum).enumerate() {
                     let average = self.at(band * BAND + i, from);
-                    for c in 0..3 {
+                    for c in [0, 1, 2] {
                         over[c] = 2.0 * average[c] - over[c];
                         sum[c] += coefficient * over[c];
                     }

@@ -4,21 +4,21 @@
 use glam::{DVec2, DVec3, Vec3, dvec2, dvec3};
 
 /// A mesh over a grid of parameters, and what is true at each vertex.
-pub struct Shape {
-    pub positions: Vec<Vec3>,
-    pub normals: Vec<Vec3>,
-    pub triangles: Vec<[u32; 3]>,
+pub(crate) struct Shape {
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) normals: Vec<Vec3>,
+    pub(crate) triangles: Vec<[u32; 3]>,
     /// Principal curvatures, the larger first.
-    pub curvatures: Vec<(f64, f64)>,
+    pub(crate) curvatures: Vec<(f64, f64)>,
     /// Whether a vertex is away from the surface's border.
-    pub inner: Vec<bool>,
+    pub(crate) inner: Vec<bool>,
 }
 
 /// SplitMix64 (Steele, Lea, Flood 2014), from -1 to 1.
-pub struct Noise(pub u64);
+pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
-    pub fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -28,7 +28,7 @@ impl Noise {
 
 /// A grid of `nu` by `nv` cells; parameters run from 0 to 1, each vertex moved by up to `jitter` of a cell; `wraps` says
 /// which parameter is periodic. `at` gives position, normal and principal curvatures.
-pub fn grid(
+pub(crate) fn grid(
     (nu, nv): (usize, usize),
     wraps: (bool, bool),
     jitter: f64,
@@ -71,7 +71,7 @@ pub fn grid(
 use std::f64::consts::TAU;
 
 /// About z, radii `big` and `small`.
-pub fn torus(cells: (usize, usize), big: f64, small: f64, jitter: f64) -> Shape {
+pub(crate) fn torus(cells: (usize, usize), big: f64, small: f64, jitter: f64) -> Shape {
     grid(cells, (true, true), jitter, |uv| {
         let (a, b) = (TAU * uv.x, TAU * uv.y);
         let n = dvec3(a.cos() * b.cos(), a.sin() * b.cos(), b.sin());
@@ -81,7 +81,7 @@ pub fn torus(cells: (usize, usize), big: f64, small: f64, jitter: f64) -> Shape 
 }
 
 /// Along z.
-pub fn cylinder(cells: (usize, usize), radius: f64, height: f64, jitter: f64) -> Shape {
+pub(crate) fn cylinder(cells: (usize, usize), radius: f64, height: f64, jitter: f64) -> Shape {
     grid(cells, (true, false), jitter, |uv| {
         let a = TAU * uv.x;
         let n = dvec3(a.cos(), a.sin(), 0.0);
@@ -90,7 +90,7 @@ pub fn cylinder(cells: (usize, usize), radius: f64, height: f64, jitter: f64) ->
 }
 
 /// `z = -c (x² - y²) / 2` over [-1, 1]², normal up.
-pub fn saddle(cells: (usize, usize), c: f64, jitter: f64) -> Shape {
+pub(crate) fn saddle(cells: (usize, usize), c: f64, jitter: f64) -> Shape {
     grid(cells, (false, false), jitter, |uv| {
         let (x, y) = (2.0 * uv.x - 1.0, 2.0 * uv.y - 1.0);
         let (p, q) = (-c * x, c * y);
@@ -107,7 +107,7 @@ pub fn saddle(cells: (usize, usize), c: f64, jitter: f64) -> Shape {
 }
 
 /// Half axes a, b, c; poles left open.
-pub fn ellipsoid(cells: (usize, usize), axes: DVec3, jitter: f64) -> Shape {
+pub(crate) fn ellipsoid(cells: (usize, usize), axes: DVec3, jitter: f64) -> Shape {
     grid(cells, (true, false), jitter, |uv| {
         let (phi, theta) =
             (TAU * uv.x, 0.1 * std::f64::consts::PI + 0.8 * std::f64::consts::PI * (1.0 - uv.y));
@@ -127,7 +127,7 @@ pub fn ellipsoid(cells: (usize, usize), axes: DVec3, jitter: f64) -> Shape {
 
 /// A cube's sides, subdivided, projected on a sphere, each vertex moved along it by `jitter` of a cell; sides share
 /// vertices by position only.
-pub fn sphere(cells: usize, radius: f64, jitter: f64) -> Shape {
+pub(crate) fn sphere(cells: usize, radius: f64, jitter: f64) -> Shape {
     let mut shape = Shape {
         positions: Vec::new(),
         normals: Vec::new(),

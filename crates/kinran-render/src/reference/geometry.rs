@@ -3,7 +3,7 @@
 use super::{Bvh, CameraRay, Hit};
 use crate::Error;
 use glam::{Mat3, Vec2, Vec3, Vec4};
-use kinran_scene::Scene;
+use kinran_scene::{Primitive, Scene};
 
 /// The most triangles a scene may have once its instances are placed: 2^26, about 10 GB.
 pub const MAX_TRIANGLES: usize = 1 << 26;
@@ -16,6 +16,10 @@ pub struct Geometry {
     pub(crate) tangents: Vec<Vec4>,
     pub(crate) uvs: Vec<[Vec2; 2]>,
     pub(crate) colors: Vec<Vec4>,
+    /// Codes of curvature tensors, flat where there are none; empty where no primitive has any.
+    pub(crate) curvature: Vec<Vec4>,
+    /// Curvature of the code one, 1/mm.
+    pub(crate) curvature_range: f32,
     pub(crate) triangles: Vec<[u32; 3]>,
     pub(crate) materials: Vec<u32>,
     min: Vec3,
@@ -41,9 +45,14 @@ pub struct SurfacePoint {
     pub uv_dy: [Vec2; 2],
     /// Linear RGBA of the vertices, white where they have none.
     pub color: Vec4,
+    /// Code of the curvature tensor (`_CURVATURE`), of the geometry's range; flat where there is none.
+    pub curvature: Vec4,
     /// Index of the material.
     pub material: usize,
 }
+
+/// The code of no curvature.
+const FLAT: Vec4 = Vec4::new(0.0, 128.0 / 255.0, 0.0, 0.0);
 
 impl Geometry {
     /// Places every instance of `scene`.
@@ -68,11 +77,20 @@ impl Geometry {
             tangents: Vec::with_capacity(vertices),
             uvs: Vec::with_capacity(vertices),
             colors: Vec::with_capacity(vertices),
+            curvature: Vec::new(),
+            curvature_range: 1.0,
             triangles: Vec::with_capacity(count),
             materials: Vec::with_capacity(count),
             min: Vec3::INFINITY,
             max: Vec3::NEG_INFINITY,
         };
+        // One range for all: the code of a smaller range is scaled, for codes are roots.
+        let range = |(_, p): (_, &Primitive)| p.curvature.as_ref().map_or(0.0, |c| c.range);
+        let largest = primitives().map(range).fold(0.0, f32::max);
+        if largest > 0.0 {
+            geometry.curvature_range = largest;
+            geometry.curvature.reserve_exact(vertices);
+        }
         for (instance, primitive) in primitives() {
             let first = geometry.positions.len() as u32;
             let linear = Mat3::from(instance.transform.matrix3);
@@ -93,6 +111,16 @@ impl Geometry {
             geometry.uvs.extend((0..primitive.positions.len()).map(|i| [uv(0, i), uv(1, i)]));
             let color = |i| primitive.colors.get(i).copied().unwrap_or(Vec4::ONE);
             geometry.colors.extend((0..primitive.positions.len()).map(color));
+            if largest > 0.0 {
+                match &primitive.curvature {
+                    Some(curvature) => {
+                        let scale = (curvature.range / largest).sqrt();
+                        let scale = Vec4::new(scale, 1.0, scale, scale);
+                        geometry.curvature.extend(curvature.codes.iter().map(|&code| code * scale));
+                    }
+                    None => geometry.curvature.resize(geometry.positions.len(), FLAT),
+                }
+            }
 
             // Front faces stay counter-clockwise under a mirroring instance.
             let turn = |&[a, b, c]: &[u32; 3]| if mirror < 0.0 { [a, c, b] } else { [a, b, c] };
@@ -118,6 +146,11 @@ impl Geometry {
     /// Smallest and largest coordinates of all triangles; `None` without any.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         (!self.triangles.is_empty()).then_some((self.min, self.max))
+    }
+
+    /// Curvature of the code one in [`SurfacePoint::curvature`], 1/mm.
+    pub fn curvature_range(&self) -> f32 {
+        self.curvature_range
     }
 
     /// The hierarchy over the triangles.
@@ -169,6 +202,13 @@ impl Geometry {
             color: weights.x * self.colors[corners[0]]
                 + weights.y * self.colors[corners[1]]
                 + weights.z * self.colors[corners[2]],
+            curvature: if self.curvature.is_empty() {
+                FLAT
+            } else {
+                weights.x * self.curvature[corners[0]]
+                    + weights.y * self.curvature[corners[1]]
+                    + weights.z * self.curvature[corners[2]]
+            },
             material: self.material(hit.triangle),
         }
     }

@@ -14,6 +14,7 @@ mod render;
 pub(crate) mod sampler;
 mod scene;
 mod shading;
+mod skin;
 mod texture;
 
 pub use bvh::{Bvh, Hit};
@@ -21,4 +22,5 @@ pub use camera::{CameraRay, PictureCamera, frame_box, look_at};
 pub use geometry::{Geometry, MAX_TRIANGLES, SurfacePoint};
 pub use render::{Background, Film, Settings, TextureFiltering, render};
 pub use scene::{BoundTexture, RenderMaterial, RenderScene, SurfaceTextures, Surroundings};
+pub use skin::{RenderSkin, SkinCurvature, SkinTable, SkinTables};
 pub use texture::{MipLevel, MipTexture};

@@ -234,7 +234,13 @@ impl Renderer<'_> {
             if !material.double_sided && point.geometric_normal.dot(view) <= 0.0 {
                 continue;
             }
-            let shading = Shading::new(material, &point, view, self.settings.filtering);
+            let shading = Shading::new(
+                material,
+                &point,
+                view,
+                self.settings.filtering,
+                self.scene.geometry.curvature_range(),
+            );
             if shading.opacity > 0.0 {
                 seen += through * shading.opacity * self.reflected(&shading, &point, &hit, view, sample);
             }
@@ -259,13 +265,35 @@ impl Renderer<'_> {
         let to_shading = shading.frame.transpose();
         for light in &self.scene.lights {
             let Some(light) = incident(light, point.position) else { continue };
+            if let (Some(at), Some(skin)) = (shading.skin, &self.scene.materials[point.material].skin) {
+                let u = to_shading * light.direction;
+                let scattered = shading.diffuse * FRAC_1_PI * skin.punctual(&at, light.direction);
+                let reflected = (scattered + shading.specular(u) * u.z.max(0.0)) * light.irradiance;
+                // Where the surface turns away, the table says how far light comes around it; a shadow ray would
+                // only meet the surface itself.
+                let turned_away = point.geometric_normal.dot(light.direction) <= 0.0;
+                if turned_away {
+                    sum += reflected;
+                } else if reflected.max_element() > 0.0 {
+                    sum += reflected * self.visibility(point, hit, view, light.direction, light.distance);
+                }
+                continue;
+            }
             let reflected = shading.reflected(to_shading * light.direction) * light.irradiance;
             if reflected.max_element() > 0.0 {
                 sum += reflected * self.visibility(point, hit, view, light.direction, light.distance);
             }
         }
         if let Some(surroundings) = &self.scene.surroundings {
-            let diffuse = shading.diffuse * FRAC_1_PI * surroundings.irradiance(shading.frame.z_axis);
+            let n = shading.frame.z_axis;
+            let irradiance = match (shading.skin, &self.scene.materials[point.material].skin) {
+                (Some(at), Some(skin)) => {
+                    let (h_one, h_two) = skin.ambient(&at);
+                    surroundings.skin_irradiance(n, h_one, h_two)
+                }
+                _ => surroundings.irradiance(n),
+            };
+            let diffuse = shading.diffuse * FRAC_1_PI * irradiance;
             let specular = self.environment_specular(shading, surroundings, sample);
             sum += shading.occlusion * (diffuse + specular);
         }

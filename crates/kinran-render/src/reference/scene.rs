@@ -1,11 +1,12 @@
 //! A scene as the renderer needs it.
 
-use super::{Geometry, MipTexture};
+use super::{Geometry, MipTexture, RenderSkin};
 use crate::Error;
 use glam::{Mat3, Vec2, Vec3, Vec4};
 use kinran_image::Transfer;
 use kinran_scene::{AlphaMode, Environment, Light, Material, Scene, TextureRef};
 use kinran_shading::sh::{Sh9, sh_convolve_cosine, sh_evaluate};
+use kinran_shading::skin::lighting::skin_irradiance;
 use std::{collections::HashMap, sync::Arc};
 
 /// A texture in its place on a mesh.
@@ -53,6 +54,8 @@ pub struct RenderMaterial {
     pub emissive_factor: Vec3,
     /// Linear RGB.
     pub emissive: Option<BoundTexture>,
+    /// Pre-integrated skin in place of the Lambert lobe. [`RenderScene::new`] leaves it out: whoever has the tables sets it.
+    pub skin: Option<RenderSkin>,
     /// What alpha does.
     pub alpha_mode: AlphaMode,
     /// Both sides are lit; otherwise back faces are invisible.
@@ -65,19 +68,26 @@ pub struct RenderMaterial {
 pub struct Surroundings {
     /// Radiance and its sampling.
     pub environment: Environment,
+    pub(crate) radiance: Sh9,
     pub(crate) irradiance: Sh9,
 }
 
 impl Surroundings {
     /// Projects the environment on spherical harmonics.
     pub fn new(environment: Environment) -> Self {
-        let irradiance = sh_convolve_cosine(&environment.spherical_harmonics());
-        Surroundings { environment, irradiance }
+        let radiance = environment.spherical_harmonics();
+        let irradiance = sh_convolve_cosine(&radiance);
+        Surroundings { environment, radiance, irradiance }
     }
 
     /// Irradiance on a surface with unit normal `n`, never negative.
     pub fn irradiance(&self, n: Vec3) -> Vec3 {
         sh_evaluate(&self.irradiance, n).max(Vec3::ZERO)
+    }
+
+    /// Irradiance of skin with unit normal `n` that leaves `h_one` and `h_two` of bands 1 and 2, never negative.
+    pub fn skin_irradiance(&self, n: Vec3, h_one: Vec3, h_two: Vec3) -> Vec3 {
+        skin_irradiance(&self.radiance, n, h_one, h_two).max(Vec3::ZERO)
     }
 }
 
@@ -185,6 +195,7 @@ impl TextureLoader<'_> {
             occlusion_strength: m.occlusion_strength,
             emissive_factor: m.emissive_factor,
             emissive: load(&m.emissive, Transfer::Srgb)?,
+            skin: None,
             alpha_mode: m.alpha_mode,
             double_sided: m.double_sided,
             transmissive: m.ignored_extensions.iter().any(|e| e == "KHR_materials_transmission"),

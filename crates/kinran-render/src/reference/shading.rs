@@ -9,12 +9,13 @@ use super::{
     geometry::SurfacePoint,
     render::TextureFiltering,
     scene::{BoundTexture, RenderMaterial},
+    skin::SkinPoint,
 };
 use glam::{Mat3, Vec3, Vec4, Vec4Swizzles};
 use kinran_scene::AlphaMode;
 use kinran_shading::{
-    alpha_from_roughness, aniso_decode, ggx_aniso_d, m_n, multiscatter_compensation, normal_from_xy,
-    schlick_f, smith_aniso_v,
+    alpha_from_roughness, aniso_decode, ggx_aniso_d, ggx_d, m_n, multiscatter_compensation, normal_from_xy,
+    schlick_f, smith_aniso_v, smith_v,
 };
 use std::f32::consts::FRAC_1_PI;
 
@@ -44,6 +45,8 @@ pub(crate) struct Shading {
     pub(crate) emitted: Vec3,
     /// 0 is a hole, 1 is opaque.
     pub(crate) opacity: f32,
+    /// Where the material is skin, seen from its front.
+    pub(crate) skin: Option<SkinPoint>,
 }
 
 /// A texture at a point as `filtering` says; white where there is none.
@@ -101,6 +104,7 @@ impl Shading {
         point: &SurfacePoint,
         view: Vec3,
         filtering: TextureFiltering,
+        curvature_range: f32,
     ) -> Self {
         let base = base_color(material, point, filtering);
         let metallic_roughness = sample(&material.metallic_roughness, point, filtering);
@@ -149,6 +153,11 @@ impl Shading {
             occlusion: 1.0 + material.occlusion_strength * (occlusion - 1.0),
             emitted: material.emissive_factor * sample(&material.emissive, point, filtering).xyz(),
             opacity: opacity(material, base),
+            skin: material
+                .skin
+                .as_ref()
+                .filter(|_| front > 0.0)
+                .map(|skin| skin.at(point, normal, curvature_range)),
         }
     }
 
@@ -161,7 +170,12 @@ impl Shading {
         let h = (u + self.v).normalize();
         let d = ggx_aniso_d(h, self.alpha_t, self.alpha_b);
         let visibility = smith_aniso_v(u, self.v, self.alpha_t, self.alpha_b);
-        d * visibility * schlick_f(self.f0, self.v.dot(h)) * self.compensation
+        let mut lobe = d * visibility;
+        if let Some(skin) = self.skin.filter(|skin| skin.second_share > 0.0) {
+            let second = ggx_d(h.z, skin.second_alpha) * smith_v(u.z, self.v.z, skin.second_alpha);
+            lobe += skin.second_share * (second - lobe);
+        }
+        lobe * schlick_f(self.f0, self.v.dot(h)) * self.compensation
     }
 
     /// All of the BRDF for a light along `u` in the shading frame, per steradian, times the cosine.

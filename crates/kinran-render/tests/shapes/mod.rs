@@ -1,7 +1,7 @@
 //! Small scenes for tests and benches.
 
 use glam::{Affine3A, Vec2, Vec3, vec2, vec3, vec4};
-use kinran_scene::{AlphaMode, Instance, Light, LightKind, Material, Primitive, Scene};
+use kinran_scene::{AlphaMode, Instance, Light, LightKind, Material, Primitive, Scene, Source};
 
 /// A square of side 2 in the xy plane, facing +z, u to the right and v down.
 pub(crate) fn square(material: usize) -> Primitive {
@@ -12,8 +12,10 @@ pub(crate) fn square(material: usize) -> Primitive {
         tangents: vec![vec4(1.0, 0.0, 0.0, 1.0); 4],
         uvs: [corners.iter().map(|c| vec2(0.5 + 0.5 * c.x, 0.5 - 0.5 * c.y)).collect(), Vec::new()],
         colors: Vec::new(),
+        curvature: None,
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         material,
+        source: Source::default(),
     }
 }
 
@@ -36,10 +38,12 @@ pub(crate) fn sphere(rings: u32) -> Primitive {
         tangents: vertices.iter().map(|v| v.1.extend(1.0)).collect(),
         uvs: [vertices.iter().map(|v| v.2).collect(), Vec::new()],
         colors: Vec::new(),
+        curvature: None,
         triangles: quads
             .flat_map(|a| [[a, a + columns + 1, a + columns + 2], [a, a + columns + 2, a + 1]])
             .collect(),
         material: 0,
+        source: Source::default(),
     }
 }
 
@@ -59,6 +63,7 @@ pub(crate) fn material(base_color: Vec3, metallic: f32, roughness: f32) -> Mater
         emissive_factor: Vec3::ZERO,
         emissive: None,
         anisotropy: None,
+        skin: None,
         alpha_mode: AlphaMode::Opaque,
         double_sided: false,
         ignored_extensions: Vec::new(),

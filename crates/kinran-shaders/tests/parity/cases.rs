@@ -2,6 +2,7 @@
 
 mod detail;
 mod fuzz;
+mod skin;
 
 use fastrand::Rng;
 use glam::{Mat3, Vec2, Vec3, vec2, vec3};
@@ -542,5 +543,6 @@ pub(crate) fn cases() -> Vec<Case> {
     ]);
     cases.extend(detail::cases());
     cases.extend(fuzz::cases());
+    cases.extend(skin::cases());
     cases
 }

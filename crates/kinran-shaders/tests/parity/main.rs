@@ -111,8 +111,9 @@ fn no_shader_function_is_without_a_parity_test() {
 /// The shader library is the formulas' second language: what is public in one is there in the other.
 #[test]
 fn no_rust_function_is_without_a_shader_twin() {
-    // Only the baker asks for these: quadrature points of the maximum-likelihood fit, and what solves for detail maps.
-    const BAKER_ONLY: [&str; 7] = [
+    // Only the baker asks for these: quadrature points of the maximum-likelihood fit, and what solves for detail maps,
+    // where columns of skin's table stand.
+    const BAKER_ONLY: [&str; 8] = [
         "microfacet_basis",
         "overlay_inverse",
         "overlay_slope",
@@ -120,6 +121,7 @@ fn no_rust_function_is_without_a_shader_twin() {
         "smooth_overlay_slope",
         "rnm_inverse",
         "detail_over_inverse",
+        "column_n_u",
     ];
     let shaders = Signature::all(kinran_shaders::wgsl::ALL);
     let mut found = 0;

@@ -38,8 +38,8 @@ pub fn curvature_from_light(tensor: Sym2, u_tb: Vec2) -> f32 {
 }
 
 /// The curvature in the direction of the light's projection on the tangent plane, 1/mm: [`curvature_from_light`] over
-/// the squared length of `u_tb`. Where the light stands in the normal within 1e-3 rad there is no direction and
-/// the result falls to zero.
+/// the squared length of `u_tb`. Where the light stands in the normal there is no direction, and within some 1e-3 rad of
+/// it the result goes over to the mean.
 pub fn curvature_from_light_normalized(tensor: Sym2, u_tb: Vec2) -> f32 {
-    tensor.quadratic(u_tb) / u_tb.length_squared().max(1e-6)
+    (tensor.quadratic(u_tb) + 5e-7 * tensor.trace()) / (u_tb.length_squared() + 1e-6)
 }

@@ -26,7 +26,7 @@ impl LinearProfile<'_> {
                 for g in sum {
                     let sigma = sqrt(g.variance);
                     let rise = blurred_line(at - 0.5 * width, sigma) - blurred_line(at - width, sigma);
-                    for c in 0..3 {
+                    for c in [0, 1, 2] {
                         light[c] += g.weight[c] * rise * 2.0 / width;
                         mass[c] += g.weight[c];
                     }
@@ -49,7 +49,7 @@ impl LinearProfile<'_> {
                 let x = a + (b - a) * (f64::from(i) + 0.5) / 9.0;
                 let density = self.density(x);
                 let lit = ramp(at - x) + ramp(at + x);
-                for c in 0..3 {
+                for c in [0, 1, 2] {
                     light[c] += (b - a) * density[c] * lit;
                     mass[c] += (b - a) * density[c] * 2.0;
                 }

@@ -230,7 +230,7 @@ impl<'a> LinearProfile<'a> {
                     let (r0, r1) = (r0.max(x), r1.max(x));
                     let (y0, y1) = (along(r0), along(r1));
                     let of_r = integral_of_r(r1, y1) - integral_of_r(r0, y0);
-                    for c in 0..3 {
+                    for c in [0, 1, 2] {
                         sum[c] += 2.0 * (a[c] * (y1 - y0) + b[c] * of_r);
                     }
                 };

@@ -60,7 +60,7 @@ impl LinearProfile<'_> {
             let x = column_n_u(i, columns).max(0.0);
             let angle = asin(x);
             cumulative.advance(angle);
-            for c in 0..3 {
+            for c in [0, 1, 2] {
                 row[i][c] = x * cumulative.cos[c] - cos(angle) * cumulative.sin[c];
             }
         }
@@ -68,7 +68,7 @@ impl LinearProfile<'_> {
             let x = column_n_u(i, columns).max(0.0);
             let angle = asin(x);
             cumulative.advance(PI - angle);
-            for c in 0..3 {
+            for c in [0, 1, 2] {
                 row[i][c] += x * cumulative.cos[c] + cos(angle) * cumulative.sin[c];
             }
         }
@@ -77,7 +77,7 @@ impl LinearProfile<'_> {
         // The clamped cosine is half of cosine and its absolute value; the first turns its sign behind the terminator.
         for i in lit {
             let x = column_n_u(i, columns);
-            for c in 0..3 {
+            for c in [0, 1, 2] {
                 row[i][c] /= 2.0 * cumulative.one[c];
                 row[columns - 1 - i][c] = row[i][c] - x * cumulative.cos[c] / cumulative.one[c];
             }
@@ -145,7 +145,7 @@ fn gaussian_row(sum: &[Gaussian], r: f64, row: &mut [[f64; 3]]) {
         let (i0, i1) = (scaled_i0(kappa), scaled_i1(kappa));
         let rho = i1 / i0;
         let share = g.weight.map(|w| w * i0 / sqrt(g.variance));
-        for c in 0..3 {
+        for c in [0, 1, 2] {
             mass[c] += share[c];
         }
 
@@ -185,18 +185,18 @@ fn gaussian_row(sum: &[Gaussian], r: f64, row: &mut [[f64; 3]]) {
             // The hyperbolic sine over a small κ keeps no digits.
             let sinh_over_kappa = if kappa < 1e-4 { 2.0 * s } else { sinh_at / kappa };
             let d = x * (0.5 * rho + norm * integral) + s * norm * sinh_over_kappa;
-            for c in 0..3 {
+            for c in [0, 1, 2] {
                 row[i][c] += share[c] * d;
             }
             if columns - 1 - i != i {
-                for c in 0..3 {
+                for c in [0, 1, 2] {
                     row[columns - 1 - i][c] += share[c] * (d - x * rho);
                 }
             }
         }
     }
     for d in row {
-        for c in 0..3 {
+        for c in [0, 1, 2] {
             // Rounding can leave -1e-17 in the dark.
             d[c] = (d[c] / mass[c]).max(0.0);
         }

@@ -35,20 +35,20 @@ impl RadialProfile<'_> {
                     let kappa = r * r / g.variance;
                     let (one, two) = mean_legendre(kappa);
                     let inside = -expm1(-2.0 * kappa);
-                    for c in 0..3 {
+                    for c in [0, 1, 2] {
                         let m = g.weight[c] * inside;
                         mass[c] += m;
                         factors.h_one[c] += m * one;
                         factors.h_two[c] += m * two;
                     }
                 }
-                for c in 0..3 {
+                for c in [0, 1, 2] {
                     factors.h_one[c] /= mass[c];
                     factors.h_two[c] /= mass[c];
                 }
             }
             Shape::Burley(d) => {
-                for c in 0..3 {
+                for c in [0, 1, 2] {
                     // The mass within a chord has density (exp(-c/d) + exp(-c/3d)) / 4d.
                     let (near, far) = (d[c], 3.0 * d[c]);
                     let moment =
@@ -59,7 +59,7 @@ impl RadialProfile<'_> {
             }
             Shape::Sampled { .. } => {}
             Shape::Table(rows) => {
-                for c in 0..3 {
+                for c in [0, 1, 2] {
                     let mut moments = [0.0; 3];
                     let mut add = |c0: f64, c1: f64, a: f64, b: f64| {
                         let c1 = c1.min(2.0 * r);

@@ -5,7 +5,8 @@ use std::path::Path;
 use clap::ValueEnum;
 use glam::{Vec3, Vec4};
 use kinran_bake::curvature::{
-    BLUR, Curvature, Mesh, Method, Options, Packed, bake_curvature, estimated_normals, principal, uniform_scale,
+    BLUR, Curvature, Mesh, Method, Options, Packed, bake_curvature, estimated_normals, principal,
+    uniform_scale,
 };
 use kinran_image::{Channels, Image, Pixels, write_atomically, write_exr};
 use kinran_scene::{Attribute, Document, Primitive, Scene, Skin};
@@ -99,6 +100,17 @@ fn deviations(text: &str) -> Result<Blur, String> {
     }
 }
 
+impl CurvatureArgs {
+    /// Whether a primitive gets curvature.
+    pub(super) fn wants(&self, scene: &Scene, primitive: &Primitive) -> bool {
+        match self.curvature {
+            Which::Skin => scene.materials[primitive.material].skin.is_some(),
+            Which::All => true,
+            Which::None => false,
+        }
+    }
+}
+
 /// Curvature of one mesh.
 #[derive(Clone, Debug, Serialize)]
 pub struct CurvatureReport {
@@ -179,7 +191,11 @@ pub(super) fn with_normals(input: &Path, args: &CurvatureArgs) -> Result<Option<
 ///
 /// # Errors
 /// Where a name is none of the materials'.
-pub(super) fn mark_skin(args: &CurvatureArgs, scene: &mut Scene, document: &mut Document) -> Result<(), Error> {
+pub(super) fn mark_skin(
+    args: &CurvatureArgs,
+    scene: &mut Scene,
+    document: &mut Document,
+) -> Result<(), Error> {
     for name in &args.skin {
         let chosen: Vec<usize> = (0..document.material_count().min(scene.materials.len()))
             .filter(|&i| name == "all" || scene.materials[i].name == *name)
@@ -215,16 +231,10 @@ pub(super) fn bake(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<CurvatureReport>, Error> {
     let flags = &args.curvature;
-    let wanted = |p: &Primitive| match flags.curvature {
-        Which::Skin => scene.materials[p.material].skin.is_some(),
-        Which::All => true,
-        Which::None => false,
-    };
+    let wanted = |p: &Primitive| flags.wants(scene, p);
     let mut reports = Vec::new();
-    let groups: Vec<Vec<usize>> = meshes(scene)
-        .into_iter()
-        .filter(|mesh| mesh.iter().any(|&i| wanted(&scene.primitives[i])))
-        .collect();
+    let groups: Vec<Vec<usize>> =
+        meshes(scene).into_iter().filter(|mesh| mesh.iter().any(|&i| wanted(&scene.primitives[i]))).collect();
     let stage = console.progress().stage("curvature", groups.len() as u64);
     for mesh in groups {
         let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
@@ -238,8 +248,7 @@ pub(super) fn bake(
             )));
         }
         let surface = Joined::new(&group);
-        let millimetres =
-            flags.unit_mm.map_or_else(|| unit(scene, &mesh, &name, warnings), f64::from);
+        let millimetres = flags.unit_mm.map_or_else(|| unit(scene, &mesh, &name, warnings), f64::from);
         let options = Options {
             method: match flags.curvature_method {
                 MethodName::Normals => Method::Normals,
@@ -338,7 +347,9 @@ fn unit(scene: &Scene, mesh: &[usize], name: &str, warnings: &mut Vec<String>) -
     let largest = scales.iter().map(|s| s.0).fold(0.0, f64::max);
     let smallest = scales.iter().map(|s| s.0).fold(f64::INFINITY, f64::min);
     if scales.iter().any(|s| !s.1) {
-        warnings.push(format!("{name} is stretched by its node; curvature is that of the mesh, not of its picture"));
+        warnings.push(format!(
+            "{name} is stretched by its node; curvature is that of the mesh, not of its picture"
+        ));
     }
     if largest > 1.01 * smallest {
         warnings.push(format!(
@@ -355,12 +366,12 @@ fn mesh_name(document: &Document, mesh: usize) -> String {
 
 /// Vertices of the document's primitive.
 fn vertex_count(document: &Document, mesh: usize, primitive: usize) -> usize {
-    let position = document
-        .json()
-        .get("meshes")
-        .and_then(|m| m.get(mesh)?.get("primitives")?.get(primitive)?.get("attributes")?.get("POSITION")?.as_u64());
-    let count = position
-        .and_then(|accessor| document.json().get("accessors")?.get(accessor as usize)?.get("count")?.as_u64());
+    let position = document.json().get("meshes").and_then(|m| {
+        m.get(mesh)?.get("primitives")?.get(primitive)?.get("attributes")?.get("POSITION")?.as_u64()
+    });
+    let count = position.and_then(|accessor| {
+        document.json().get("accessors")?.get(accessor as usize)?.get("count")?.as_u64()
+    });
     count.unwrap_or(0) as usize
 }
 
@@ -410,7 +421,8 @@ fn dump(
     surface: &Joined,
 ) -> Result<(), Error> {
     let stem = args.input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-    let path = |extension: &str| args.output.join(format!("{stem}_{}_curvature.{extension}", file_stem(name)));
+    let path =
+        |extension: &str| args.output.join(format!("{stem}_{}_curvature.{extension}", file_stem(name)));
     match format {
         DumpFormat::Exr => {
             let height = baked.tensors.len().div_ceil(DUMP_WIDTH);

@@ -11,7 +11,9 @@ use kinran_image::{
 use kinran_scene::{Document, Scene, Slot, TextureExtension, TextureRef};
 use serde_json::Value;
 
-use super::{Args, Form, Input, Output, Report, SurfaceReport, file_name, file_stem, write_texture};
+use super::{
+    Args, Form, Input, Output, Report, SurfaceReport, curvature, file_name, file_stem, write_texture,
+};
 use crate::{Console, Error};
 
 /// Bakes every material of a glTF file that has a normal or an anisotropy map.
@@ -30,8 +32,12 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<(), Error> {
             args.input.display()
         )));
     }
-    let scene = Scene::load(&args.input)?;
-    let mut document = Document::open(&args.input)?;
+    let smoothed = curvature::with_normals(&args.input, &args.curvature)?;
+    let input =
+        smoothed.as_ref().map_or_else(|| args.input.clone(), |f| f.path().join(file_name(&args.input)));
+    let mut scene = Scene::load(&input)?;
+    let mut document = Document::open(&input)?;
+    curvature::mark_skin(&args.curvature, &mut scene, &mut document)?;
     let mut report = Report::new(args);
     report.warnings.clone_from(&scene.warnings);
 
@@ -51,7 +57,8 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<(), Error> {
             Err(NoSurface::Apart(reason)) => report.warnings.push(reason),
         }
     }
-    if surfaces.is_empty() && !args.all_textures {
+    let skin = scene.primitives.iter().any(|p| args.curvature.wants(&scene, p));
+    if surfaces.is_empty() && !args.all_textures && !skin {
         report.warnings.push(format!(
             "{}: no material has a normal or an anisotropy map; nothing but --all-textures would bake anything",
             args.input.display()
@@ -72,6 +79,8 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<(), Error> {
     if args.all_textures {
         bake_colors(args, &scene, &mut document, &mut names, &stem, &mut report)?;
     }
+
+    report.curvature = curvature::bake(args, console, &scene, &mut document, &mut report.warnings)?;
 
     report.warnings.extend(document.write(&output)?);
     report.write(&args.output.join(format!("{stem}.kinran.json")))?;

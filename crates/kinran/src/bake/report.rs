@@ -94,6 +94,9 @@ pub struct Report {
     pub kernel: String,
     /// The surfaces.
     pub surfaces: Vec<SurfaceReport>,
+    /// Curvature of meshes.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub curvature: Vec<super::CurvatureReport>,
     /// What was left out or assumed, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -105,6 +108,7 @@ impl Report {
             filter: args.filter.name(),
             kernel: format!("{:?}", args.kernel).to_lowercase(),
             surfaces: Vec::new(),
+            curvature: Vec::new(),
             warnings: Vec::new(),
         }
     }
@@ -131,6 +135,7 @@ impl Report {
                 o.bytes as f64 / 1024.0,
             );
         }
+        text.extend(self.curvature.iter().map(super::CurvatureReport::text));
         let bytes: usize = files().map(|o| o.bytes).sum();
         text + &format!(
             "{} files, {:.1} KiB, in {}\n",
