@@ -55,7 +55,7 @@ float curvature_from_light(vec3 tensor, vec2 u_tb) {
 /// squared length of `u_tb`. Where the light stands in the normal there is no direction, and within some 1e-3 rad of it
 /// the result goes over to the mean.
 ///
-/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 float curvature_from_light_normalized(vec3 tensor, vec2 u_tb) {
     float _e2 = sym2_quadratic(tensor, u_tb);
     float _e3 = sym2_trace(tensor);

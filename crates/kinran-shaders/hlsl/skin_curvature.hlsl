@@ -58,7 +58,7 @@ float curvature_from_light(float3 tensor, float2 u_tb)
 /// squared length of `u_tb`. Where the light stands in the normal there is no direction, and within some 1e-3 rad of it
 /// the result goes over to the mean.
 ///
-/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 float curvature_from_light_normalized(float3 tensor, float2 u_tb)
 {
     const float _e2 = sym2_quadratic(tensor, u_tb);

@@ -2096,7 +2096,7 @@ inline float curvature_from_light(
 /// squared length of `u_tb`. Where the light stands in the normal there is no direction, and within some 1e-3 rad of it
 /// the result goes over to the mean.
 ///
-/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 inline float curvature_from_light_normalized(
     metal::float3 tensor,
     metal::float2 u_tb

@@ -1544,7 +1544,7 @@ fn curvature_from_light(tensor: vec3f, u_tb: vec2f) -> f32 {
 /// squared length of `u_tb`. Where the light stands in the normal there is no direction, and within some 1e-3 rad of it
 /// the result goes over to the mean.
 ///
-/// Cost on GCN: 12 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 fn curvature_from_light_normalized(tensor: vec3f, u_tb: vec2f) -> f32 {
     return (sym2_quadratic(tensor, u_tb) + 5e-7 * sym2_trace(tensor)) / (dot(u_tb, u_tb) + 1e-6);
 }
