@@ -274,7 +274,7 @@ fn rebuilt_eigen(_: &[f32], o: &[f32]) -> Vec<f32> {
 fn rebuilt_aniso(_: &[f32], o: &[f32]) -> Vec<f32> {
     let (t, b) = (v3(&o[2..]), v3(&o[5..]));
     let s = Sym3::outer(t) * (o[0] * o[0]) + Sym3::outer(b) * (o[1] * o[1]);
-    let mut canonical = vec![o[0], o[1], t.length(), b.length(), t.dot(b)];
+    let mut canonical = vec![o[0], 0.05 * o[1].ln(), t.length(), b.length(), t.dot(b)];
     canonical.extend(columns(s));
     canonical
 }
@@ -464,7 +464,8 @@ pub(crate) fn cases() -> Vec<Case> {
         Case {
             canonical: rebuilt_aniso,
             absolute: 5e-4,
-            reason: "the axis comes from cos² of its angle, whose rounding is 2.5e-4 rad at worst",
+            reason: "the axis comes from cos² of its angle, whose rounding is 2.5e-4 rad at worst; alpha_b² is a \
+                     difference, within 2 % of ALPHA_MIN² of the right one beside alpha_t = 1",
             ..case(
                 "aniso_decode",
                 vec![
