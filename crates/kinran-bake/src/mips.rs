@@ -56,13 +56,13 @@ const PASS_LEVELS: usize = 3;
 
 /// Averages level 0 down to 1×1 and hands every band of levels 1 and up to `consume`, in parallel; returns
 /// what it returned, in order, per level. Every level is an average of level 0 alone, in floats, whatever
-/// the number of threads.
-pub(crate) fn reduce_levels<R: PlaneRows, T: Send>(
+/// the number of threads. `consume` may keep memory from one band to the next.
+pub(crate) fn reduce_levels<R: PlaneRows, T: Send, M: Default>(
     source: &R,
     size: (u32, u32),
     kernel: Kernel,
     wrap: [Wrap; 2],
-    consume: impl Fn(PlaneBand) -> T + Sync,
+    consume: impl Fn(PlaneBand, &mut M) -> T + Sync,
 ) -> Vec<Vec<T>> {
     let steps: Vec<Step> =
         (1..full_level_count(size.0, size.1)).map(|level| Step::new(size, level, kernel, wrap)).collect();
@@ -85,10 +85,10 @@ pub(crate) fn reduce_levels<R: PlaneRows, T: Send>(
             .par_chunks_mut(band_len)
             .enumerate()
             .map_init(
-                || vec![0.0; room],
-                |room, (i, samples)| {
+                || (vec![0.0; room], M::default()),
+                |(room, memory), (i, samples)| {
                     let mut made: Vec<Vec<T>> = pass.steps.iter().map(|_| Vec::new()).collect();
-                    pass.make_band(more, i, samples, room, &mut made);
+                    pass.make_band(more, i, samples, room, memory, &mut made);
                     made
                 },
             )
@@ -162,9 +162,16 @@ struct Pass<'a, R, C> {
 impl<R: PlaneRows, C> Pass<'_, R, C> {
     /// Makes and hands on band `i` of level `depth` of the pass, after the bands under it; `room` is for one
     /// band of each of their levels.
-    fn make_band<T>(&self, depth: usize, i: usize, samples: &mut [f32], room: &mut [f32], made: &mut [Vec<T>])
-    where
-        C: Fn(PlaneBand) -> T,
+    fn make_band<T, M>(
+        &self,
+        depth: usize,
+        i: usize,
+        samples: &mut [f32],
+        room: &mut [f32],
+        memory: &mut M,
+        made: &mut [Vec<T>],
+    ) where
+        C: Fn(PlaneBand, &mut M) -> T,
     {
         let step = &self.steps[depth];
         let (y0, row_len) = (i * BAND_ROWS as usize, step.row_len::<R>());
@@ -186,14 +193,14 @@ impl<R: PlaneRows, C> Pass<'_, R, C> {
                 (2 * i..).zip(rows.chunks(half).zip(samples.chunks_mut(half * row_len)))
             {
                 let band = &mut band[..2 * rows.len() * finer_len];
-                self.make_band(depth - 1, j, band, room, made);
+                self.make_band(depth - 1, j, band, room, memory, made);
                 let source = Finer::<R>::Samples(band);
                 let first_row = j * BAND_ROWS as usize;
                 pulp::Arch::new().dispatch(ReduceBand { source, first_row, step, rows, coarse });
             }
         }
         let band = PlaneBand { level: step.level, width: step.columns.len(), y0, rows: rows.len(), samples };
-        made[depth].push((self.consume)(band));
+        made[depth].push((self.consume)(band, memory));
     }
 }
 
@@ -343,7 +350,7 @@ pub fn plain_levels(
         source.row(y as u32, 0, planes.chunks_exact_mut(width));
         quantise_row(&planes, transfer, row);
     });
-    let bands = reduce_levels(&source, size, kernel, wrap, |band| {
+    let bands = reduce_levels(&source, size, kernel, wrap, |band, (): &mut ()| {
         let mut bytes = vec![0; band.width * band.rows * 4];
         for (row, out) in
             band.samples.chunks_exact(band.width * 4).zip(bytes.chunks_exact_mut(band.width * 4))

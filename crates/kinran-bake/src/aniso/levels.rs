@@ -68,14 +68,13 @@ pub fn filter_levels<T: Send>(
     maps: &SurfaceMaps,
     filter: Filter,
     kernel: Kernel,
-    consume: impl Fn(Band) -> T + Sync,
+    consume: impl Fn(&Band) -> T + Sync,
 ) -> Vec<Vec<T>> {
     let size = maps.size();
-    let finest = in_bands(size, 0, |mut band| {
-        let mut span = TexelSpan::default();
+    let finest = in_bands(size, 0, |band, span| {
         for row in 0..band.rows {
-            maps.decode_span(size, band.y0 + row, 0, size.0 as usize, &mut span);
-            band.texels.append(&span);
+            maps.decode_span(size, band.y0 + row, 0, size.0 as usize, span);
+            band.texels.append(span);
         }
         consume(band)
     });
@@ -87,7 +86,7 @@ pub fn coarser_levels<T: Send>(
     maps: &SurfaceMaps,
     filter: Filter,
     kernel: Kernel,
-    consume: impl Fn(Band) -> T + Sync,
+    consume: impl Fn(&Band) -> T + Sync,
 ) -> Vec<Vec<T>> {
     match filter {
         Filter::Linear => moment_levels::<LinearFilter, T>(maps, kernel, &consume),
@@ -98,15 +97,24 @@ pub fn coarser_levels<T: Send>(
     }
 }
 
-/// Runs `band` over a level in bands, in parallel.
-fn in_bands<T: Send>(size: (u32, u32), level: usize, band: impl Fn(Band) -> T + Sync) -> Vec<T> {
+/// Runs `make` over a level in bands, in parallel. Bands come without texels, and with room for a row; the memory
+/// of both goes from band to band, since fresh pages cost more than what is computed into them.
+fn in_bands<T: Send>(
+    size: (u32, u32),
+    level: usize,
+    make: impl Fn(&mut Band, &mut TexelSpan) -> T + Sync,
+) -> Vec<T> {
     let (width, height) = (level_size(size.0, level), level_size(size.1, level));
     (0..height.div_ceil(BAND_ROWS))
         .into_par_iter()
-        .map(|i| {
+        .map_init(<(TexelSpan, TexelSpan)>::default, |(texels, row), i| {
             let y0 = i * BAND_ROWS;
             let rows = BAND_ROWS.min(height - y0);
-            band(Band { level, width, y0, rows, texels: TexelSpan::default() })
+            texels.clear();
+            let mut band = Band { level, width, y0, rows, texels: std::mem::take(texels) };
+            let made = make(&mut band, row);
+            *texels = band.texels;
+            made
         })
         .collect()
 }
@@ -139,23 +147,22 @@ impl<F: MomentFilter> PlaneRows for MomentRows<'_, F> {
 fn moment_levels<F: MomentFilter, T: Send>(
     maps: &SurfaceMaps,
     kernel: Kernel,
-    consume: &(impl Fn(Band) -> T + Sync),
+    consume: &(impl Fn(&Band) -> T + Sync),
 ) -> Vec<Vec<T>> {
     let source = MomentRows::<F> { maps, size: maps.size(), filter: PhantomData };
-    reduce_levels(&source, source.size, kernel, maps.wrap, |planes| {
-        let mut texels = TexelSpan::with_capacity(planes.width * planes.rows);
-        pulp::Arch::new().dispatch(ExtractBand::<F> {
-            planes: &planes,
-            texels: &mut texels,
-            filter: PhantomData,
-        });
-        consume(Band {
+    reduce_levels(&source, source.size, kernel, maps.wrap, |planes, texels: &mut TexelSpan| {
+        texels.clear();
+        pulp::Arch::new().dispatch(ExtractBand::<F> { planes: &planes, texels, filter: PhantomData });
+        let band = Band {
             level: planes.level,
             width: planes.width as u32,
             y0: planes.y0 as u32,
             rows: planes.rows as u32,
-            texels,
-        })
+            texels: std::mem::take(texels),
+        };
+        let made = consume(&band);
+        *texels = band.texels;
+        made
     })
 }
 
@@ -222,7 +229,7 @@ fn footprint_levels<T: Send>(
     maps: &SurfaceMaps,
     kernel: Kernel,
     fit_row: impl Fn(&SurfaceMaps, &[Taps], &Taps, &mut TexelSpan) + Sync,
-    consume: &(impl Fn(Band) -> T + Sync),
+    consume: &(impl Fn(&Band) -> T + Sync),
 ) -> Vec<Vec<T>> {
     let size = maps.size();
     let levels = full_level_count(size.0, size.1);
@@ -231,12 +238,11 @@ fn footprint_levels<T: Send>(
     (1..levels)
         .map(|level| {
             let (columns, rows) = (&columns[level - 1], &rows[level - 1]);
-            in_bands(size, level, |mut band| {
-                let mut row = TexelSpan::default();
+            in_bands(size, level, |band, row| {
                 for y in band.y0..band.y0 + band.rows {
                     row.resize(columns.len());
-                    fit_row(maps, columns, &rows[y as usize], &mut row);
-                    band.texels.append(&row);
+                    fit_row(maps, columns, &rows[y as usize], row);
+                    band.texels.append(row);
                 }
                 consume(band)
             })

@@ -144,10 +144,10 @@ impl TexelSpan {
         self.nx.is_empty()
     }
 
-    /// Room for `len` texels.
-    pub(crate) fn with_capacity(len: usize) -> Self {
-        let [nx, ny, nz, axx, axy, ayy] = std::array::from_fn(|_| Vec::with_capacity(len));
-        TexelSpan { nx, ny, nz, axx, axy, ayy, ..TexelSpan::default() }
+    /// Takes all texels out and keeps their room.
+    pub(crate) fn clear(&mut self) {
+        let TexelSpan { nx, ny, nz, axx, axy, ayy, .. } = self;
+        [nx, ny, nz, axx, axy, ayy].into_iter().for_each(Vec::clear);
     }
 
     /// Appends the texels of another span.

@@ -109,7 +109,12 @@ impl pulp::WithSimd for FitRow<'_> {
             let end = block_end(columns, x);
             scratch.block.decode(maps, &columns[x..end], rows);
             for group in (x..end).step_by(LANES) {
-                fit_group(&columns[group..end.min(group + LANES)], group, &mut scratch, out);
+                let columns = &columns[group..end.min(group + LANES)];
+                if S::F32_LANES >= LANES {
+                    fit_group::<LANES>(columns, group, &mut scratch, out);
+                } else {
+                    fit_group::<{ LANES / 2 }>(columns, group, &mut scratch, out);
+                }
             }
             x = end;
         }
@@ -204,8 +209,9 @@ fn microfacet<const COUNT: usize>(pattern: usize, k: usize) -> Vec2 {
     UNIT_SLOPES[4 * (radius % 4) + direction % 4]
 }
 
+/// Fits up to [`LANES`] neighbours; `WIDTH` is how many lanes a vector of the processor has.
 #[inline(always)]
-fn fit_group(columns: &[Taps], x0: usize, scratch: &mut Scratch, out: &mut TexelSpan) {
+fn fit_group<const WIDTH: usize>(columns: &[Taps], x0: usize, scratch: &mut Scratch, out: &mut TexelSpan) {
     let lane_columns: [&Taps; LANES] = from_fn(|l| &columns[l.min(columns.len() - 1)]);
     let Scratch { block, picks, samples, microfacets } = scratch;
     gather(block, lane_columns, picks, samples);
@@ -218,7 +224,7 @@ fn fit_group(columns: &[Taps], x0: usize, scratch: &mut Scratch, out: &mut Texel
         2 => scatter::<2>(samples, &frame, microfacets),
         _ => scatter::<1>(samples, &frame, microfacets),
     }
-    let (m, a) = maximise(microfacets, start);
+    let (m, a) = maximise::<WIDTH>(microfacets, start);
 
     let (normals, roughness) = surfaces(&frame, &mean, m, a);
     let constant = constant_texels(block, lane_columns, samples);
@@ -444,9 +450,44 @@ fn scatter<const COUNT: usize>(samples: &[Sample], frame: &[V16; 3], microfacets
     }
 }
 
+/// Sums over microfacets of u times `[1, x, y, xx, xy, yy]`, with slopes relative to the mean, in `N` lanes from
+/// `first` on: as many as a vector has, or the twelve vectors that are needed again in every round do not fit into
+/// the registers. `estimate` is the mean and the inverse of A, whose mixed element is doubled.
+#[inline(always)]
+fn add_moments<const N: usize>(
+    microfacets: &[Microfacet],
+    estimate: &[F16; 5],
+    first: usize,
+    sums: &mut [F16; 6],
+) {
+    let part = |v: &F16| -> [f32; N] { from_fn(|l| v.0[first + l]) };
+    let [mx, my, ixx, ixy, iyy] = estimate.each_ref().map(part);
+    let mut sum = [[0.0; N]; 6];
+    for h in microfacets {
+        let (hx, hy, weight) = (part(&h.x), part(&h.y), part(&h.weight));
+        for l in 0..N {
+            let (x, y) = (hx[l] - mx[l], hy[l] - my[l]);
+            // Rounding can take it below zero where A is all but singular, and a weight at -1 has no bound.
+            let q = x * (x * ixx[l] + y * ixy[l]) + y * y * iyy[l];
+            let q = if q > 0.0 { q } else { 0.0 };
+            let u = weight[l] / (1.0 + q);
+            let (ux, uy) = (u * x, u * y);
+            sum[0][l] += u;
+            sum[1][l] += ux;
+            sum[2][l] += uy;
+            sum[3][l] += ux * x;
+            sum[4][l] += ux * y;
+            sum[5][l] += uy * y;
+        }
+    }
+    for (all, part) in sums.iter_mut().zip(&sum) {
+        all.0[first..first + N].copy_from_slice(part);
+    }
+}
+
 /// The fixed point of the iteration: mean slopes and squared roughness `[xx, xy, yy]`.
 #[inline(always)]
-fn maximise(microfacets: &[Microfacet], start: [F16; 3]) -> ([F16; 2], [F16; 3]) {
+fn maximise<const WIDTH: usize>(microfacets: &[Microfacet], start: [F16; 3]) -> ([F16; 2], [F16; 3]) {
     let mut m = [F16::default(); 2];
     let mut a = start;
     for _ in 0..MAX_STEPS {
@@ -457,18 +498,12 @@ fn maximise(microfacets: &[Microfacet], start: [F16; 3]) -> ([F16; 2], [F16; 3])
         let (ixx, ixy, iyy) = (yy * inv_det, -(a[1] + a[1]) * inv_det, xx * inv_det);
 
         let mut sum = [F16::default(); 6];
-        for h in microfacets {
-            let (x, y) = (h.x - m[0], h.y - m[1]);
-            // Rounding can take it below zero where A is all but singular, and a weight at -1 has no bound.
-            let q = (x * (x * ixx + y * ixy) + y * y * iyy).max(0.0);
-            let u = h.weight / (F16::splat(1.0) + q);
-            let (ux, uy) = (u * x, u * y);
-            sum[0] += u;
-            sum[1] += ux;
-            sum[2] += uy;
-            sum[3] += ux * x;
-            sum[4] += ux * y;
-            sum[5] += uy * y;
+        let estimate = [m[0], m[1], ixx, ixy, iyy];
+        if WIDTH >= LANES {
+            add_moments::<LANES>(microfacets, &estimate, 0, &mut sum);
+        } else {
+            add_moments::<{ LANES / 2 }>(microfacets, &estimate, 0, &mut sum);
+            add_moments::<{ LANES / 2 }>(microfacets, &estimate, LANES / 2, &mut sum);
         }
 
         // The sums are about the old mean; the moments about the new one follow by the shift.

@@ -1,7 +1,12 @@
 //! How far a filtered texel's lobe is from the microfacets it stands for.
 
+use std::array::from_fn;
+use std::f32::consts::PI;
+
 use glam::Vec3;
 use kinran_shading::{Sym2, UNIT_SLOPES, microfacet_basis, sggx_d, sggx_from_ggx};
+
+use super::lanes::{F16, LANES, V16};
 
 /// Relative L2 error of one GGX lobe against the mean of others:
 /// `sqrt(∫ (D' - D)² h·z dω / ∫ D² h·z dω)`, where D is the mean of the texels' distributions.
@@ -12,36 +17,91 @@ use kinran_shading::{Sym2, UNIT_SLOPES, microfacet_basis, sggx_d, sggx_from_ggx}
 /// mixes of two roughnesses), which give too few samples of their tails. Zero for an exact fit, about one for a lobe that has
 /// nothing to do with the footprint.
 pub fn ndf_error(texels: &[(Vec3, Sym2)], fit: (Vec3, Sym2)) -> f32 {
-    // A determinant of zero is a lobe without width: the smallest roughness that is shaded.
-    let floor = |a: Sym2| a + Sym2::scalar(1e-7);
-    let lobes: Vec<_> = texels.iter().map(|&(n, a)| (n, sggx_from_ggx(n, floor(a)))).collect();
-    let fitted = sggx_from_ggx(fit.0, floor(fit.1));
-    let share = 1.0 / lobes.len() as f32;
+    pulp::Arch::new().dispatch(NdfError { texels, fit })
+}
 
-    let (mut error, mut norm) = (0.0_f64, 0.0_f64);
-    let mut add = |h: Vec3| {
-        let h = h.normalize();
-        if h.z <= 0.0 {
-            return;
+struct NdfError<'a> {
+    texels: &'a [(Vec3, Sym2)],
+    fit: (Vec3, Sym2),
+}
+
+/// Sixteen lobes: [`sggx_d`] of each, times a weight.
+#[derive(Clone, Copy, Default)]
+struct Lobes {
+    n: V16,
+    /// The adjugate of the SGGX matrix, `[xx, xy, xz, yy, yz, zz]`.
+    adjugate: [F16; 6],
+    scale: F16,
+}
+
+impl Lobes {
+    fn set(&mut self, l: usize, n: Vec3, a: Sym2, weight: f32) {
+        let s = sggx_from_ggx(n, a);
+        let (det, adj) = (s.det(), s.adjugate());
+        (self.n.x.0[l], self.n.y.0[l], self.n.z.0[l]) = (n.x, n.y, n.z);
+        for (element, v) in self.adjugate.iter_mut().zip([adj.xx, adj.xy, adj.xz, adj.yy, adj.yz, adj.zz]) {
+            element.0[l] = v;
         }
-        let mean =
-            lobes.iter().map(|&(n, s)| if h.dot(n) > 0.0 { sggx_d(s, h) } else { 0.0 }).sum::<f32>() * share;
-        let lobe = if h.dot(fit.0) > 0.0 { sggx_d(fitted, h) } else { 0.0 };
-        // Half of the samples are drawn from each; both are distributed as D h·n, and h·n is near h·z.
-        let density = 0.5 * (mean + lobe);
-        if density > 0.0 {
-            let difference = lobe - mean;
-            error += f64::from(difference * difference / density);
-            norm += f64::from(mean * mean / density);
+        self.scale.0[l] = weight * det * det.sqrt() / PI;
+    }
+
+    /// The weighted distributions at `h`, of the lobes that see it; lanes without a lobe are zero.
+    #[inline(always)]
+    fn d(&self, h: Vec3) -> F16 {
+        let [x, y, z] = h.to_array().map(F16::splat);
+        let [xx, xy, xz, yy, yz, zz] = self.adjugate;
+        let cross = xy * (x * y) + xz * (x * z) + yz * (y * z);
+        let q = xx * (x * x) + yy * (y * y) + zz * (z * z) + cross + cross;
+        let facing = self.n.dot(V16 { x, y, z });
+        let d = self.scale / (q * q);
+        // Lanes without a lobe face nothing; their 0 / 0 goes here.
+        F16(from_fn(|l| if facing.0[l] > 0.0 { d.0[l] } else { 0.0 }))
+    }
+}
+
+impl pulp::WithSimd for NdfError<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> f32 {
+        let Self { texels, fit } = self;
+        // A determinant of zero is a lobe without width: the smallest roughness that is shaded.
+        let floor = |a: Sym2| a + Sym2::scalar(1e-7);
+        let share = 1.0 / texels.len() as f32;
+        let mut lobes = vec![Lobes::default(); texels.len().div_ceil(LANES)];
+        for (i, &(n, a)) in texels.iter().enumerate() {
+            lobes[i / LANES].set(i % LANES, n, floor(a), share);
         }
-    };
-    for &(n, a) in texels {
-        let [x, y, z] = microfacet_basis(n, floor(a));
-        UNIT_SLOPES.iter().for_each(|s| add(x * s.x + y * s.y + z));
+        let fitted = sggx_from_ggx(fit.0, floor(fit.1));
+
+        let (mut error, mut norm) = (0.0_f64, 0.0_f64);
+        let mut add = |h: Vec3| {
+            let h = h.normalize();
+            if h.z <= 0.0 {
+                return;
+            }
+            let mut means = F16::default();
+            for lobes in &lobes {
+                means += lobes.d(h);
+            }
+            let mean: f32 = means.0.iter().sum();
+            let lobe = if h.dot(fit.0) > 0.0 { sggx_d(fitted, h) } else { 0.0 };
+            // Half of the samples are drawn from each; both are distributed as D h·n, and h·n is near h·z.
+            let density = 0.5 * (mean + lobe);
+            if density > 0.0 {
+                let difference = lobe - mean;
+                error += f64::from(difference * difference / density);
+                norm += f64::from(mean * mean / density);
+            }
+        };
+        for &(n, a) in texels {
+            let [x, y, z] = microfacet_basis(n, floor(a));
+            UNIT_SLOPES.iter().for_each(|s| add(x * s.x + y * s.y + z));
+        }
+        let [x, y, z] = microfacet_basis(fit.0, floor(fit.1));
+        for _ in texels {
+            UNIT_SLOPES.iter().for_each(|s| add(x * s.x + y * s.y + z));
+        }
+        if norm > 0.0 { (error / norm).sqrt() as f32 } else { 0.0 }
     }
-    let [x, y, z] = microfacet_basis(fit.0, floor(fit.1));
-    for _ in texels {
-        UNIT_SLOPES.iter().for_each(|s| add(x * s.x + y * s.y + z));
-    }
-    if norm > 0.0 { (error / norm).sqrt() as f32 } else { 0.0 }
 }

@@ -16,8 +16,9 @@ use super::Green;
 /// number. 0.25 stands between, chosen by eye.
 pub const GREEN_CONFIDENCE: f64 = 0.25;
 
-/// Texels looked at in one image, about; enough for the statistics' third digit, quick at 16384².
-const MAX_LOOKED_AT: usize = 1 << 22;
+/// Texels looked at in one image, about: shares and correlations of half a million texels have a standard error of
+/// 0.0014 at most, a hundredth of what the decisions below turn on.
+const MAX_LOOKED_AT: usize = 1 << 19;
 
 /// Which way green points in a normal map, by its texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -164,7 +165,8 @@ fn component(sample: f32, signed: bool) -> f64 {
 
 /// What `look` says of the rows looked at, in parallel and in order.
 fn in_rows<T: Send>(image: &Image, rows: Range<u32>, look: impl Fn(u32) -> T + Sync + Send) -> Vec<T> {
-    let step = (image.width as usize * image.height as usize).div_ceil(MAX_LOOKED_AT);
+    // An odd step meets every phase of a weave whose period is a power of two.
+    let step = (image.width as usize * image.height as usize).div_ceil(MAX_LOOKED_AT) | 1;
     let rows: Vec<u32> = rows.step_by(step).collect();
     rows.into_par_iter().map(look).collect()
 }
