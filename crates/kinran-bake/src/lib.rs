@@ -1,13 +1,16 @@
 //! Filters and solvers that turn authored maps into runtime textures.
 
 pub mod aniso;
+pub mod cache;
 mod channels;
 pub mod curvature;
 pub mod detail;
 pub mod folder;
+pub mod manifest;
 mod material;
 mod mips;
 pub mod skin_lut;
+pub mod stamps;
 
 pub use material::{MaterialSurface, NoSurface, material_surface};
 pub use mips::{

@@ -22,4 +22,6 @@ pub use ktx2_file::{decode_ktx2, encode_ktx2};
 pub use read::{decode_image, read_image};
 pub use texture::{Format, Level, Texture, Transfer, full_level_count, level_size};
 pub use texture_file::{decode_texture, read_texture, write_texture};
-pub use write::{encode_png, write_atomically, write_atomically_with, write_exr, write_png};
+pub use write::{
+    encode_png, write_atomically, write_atomically_in, write_atomically_with, write_exr, write_png,
+};

@@ -30,11 +30,28 @@ pub fn write_atomically_with(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
 ) -> Result<(), Error> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    write_by_rename(folder, path, write)
+}
+
+/// As [`write_atomically`], with the temporary file in `scratch`, a folder of the same file system: if the
+/// process is killed, nothing strange stays in the folder of `path`.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn write_atomically_in(scratch: &Path, path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    write_by_rename(scratch, path, |file| file.write_all(bytes))
+}
+
+fn write_by_rename(
+    folder: &Path,
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
+) -> Result<(), Error> {
     let fail = |e| Error::io(path, e);
     if path.is_dir() {
         return Err(fail(io::ErrorKind::IsADirectory.into()));
     }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".kinran-");
     // The default is a private file; this one is meant to be seen, as far as the umask allows.

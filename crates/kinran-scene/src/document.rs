@@ -173,6 +173,20 @@ impl Document {
         &self.path
     }
 
+    /// The files that buffers and images are in, each once, as paths that begin with the document's folder.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let entries = array(&self.json, "buffers").iter().chain(array(&self.json, "images"));
+        let uris = entries.filter_map(|entry| entry.get("uri")?.as_str());
+        let files: BTreeSet<PathBuf> = uris
+            .filter_map(|uri| match parse_uri(uri) {
+                Ok(Target::File(path)) => Some(folder.join(&*path)),
+                _ => None,
+            })
+            .collect();
+        files.into_iter().collect()
+    }
+
     /// The whole document's JSON.
     pub fn json(&self) -> &Object {
         &self.json

@@ -3,13 +3,15 @@
 mod curvature;
 mod folder;
 mod gltf;
+mod library;
 mod report;
+mod settings;
 
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use kinran_bake::aniso::{Filter, Kernel, SurfaceOptions};
-use kinran_bake::folder::{Green, Role as MapRole};
+use kinran_bake::folder::{Green, Hints, Role as MapRole};
 use kinran_image::{
     Encoder, Encoding, Format, Preset, Role, Texture, encode_dds, encode_ktx2, write_atomically,
 };
@@ -22,9 +24,10 @@ use crate::{Console, Error};
 pub use curvature::{CurvatureArgs, CurvatureReport};
 pub use folder::bake_folder;
 pub use gltf::bake_gltf;
+pub use library::{CACHE_LIMIT, LibraryArgs, LibraryReport, bake_library, cache_folder};
 pub use report::{Input, Output, Report, SurfaceReport};
 
-/// Bakes a folder of authored maps or a glTF file into textures with right mips
+/// Bakes a folder of authored maps, a glTF file or a whole library into textures with right mips
 ///
 /// A folder: maps are found by the names that Substance, ambientCG, Poly Haven, Quixel and glTF exporters give
 /// them; what was understood is printed as a table, and what is ambiguous is an error that names the flag
@@ -33,24 +36,28 @@ pub use report::{Input, Output, Report, SurfaceReport};
 ///
 /// A .glb or .gltf: every material with a normal or an anisotropy map gets normal, roughness and anisotropy
 /// textures whose every level is right, in glTF's own terms; the model is written beside them.
-#[derive(Debug, clap::Args)]
+///
+/// A kinran.toml: everything that it lists, in parallel; what has not changed is not baked again. See
+/// docs/manifest.md.
+#[derive(Clone, Debug, PartialEq, clap::Args)]
 #[command(after_help = "Examples:
   kinran bake materials/brocade -o baked/
   kinran bake lamp.glb -o baked/
   kinran bake materials/brocade -o baked/ --form both --container dds --filter linear
   kinran bake scans/ -o baked/ --y-down --map direction=flow.png
   kinran bake materials/brocade -o baked/ --dry-run
+  kinran bake kinran.toml --watch
 
 Engines: --form aniso (folders' default) is the compact form, decoded in the shader as docs/aniso.md tells;
 --form khr is glTF's roughness and anisotropy maps, for viewers that know nothing of Kinran.")]
 pub struct Args {
-    /// A folder of maps, a .glb or a .gltf
+    /// A folder of maps, a .glb, a .gltf or a kinran.toml
     #[arg(value_name = "INPUT")]
     pub input: PathBuf,
 
-    /// Where the files go; made if it is not there
+    /// Where the files go; made if it is not there [default: baked, or what a kinran.toml says]
     #[arg(long, short, value_name = "DIR")]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
 
     /// How a footprint becomes one texel: ml, linear (the talk), param, lean or naive
     #[arg(long, value_name = "NAME", default_value = "ml", value_parser = filter)]
@@ -143,6 +150,10 @@ pub struct Args {
     /// Only say what was understood
     #[arg(long)]
     pub dry_run: bool,
+
+    /// Flags that only a manifest takes.
+    #[command(flatten)]
+    pub library: LibraryArgs,
 }
 
 /// `ROLE=FILE`.
@@ -263,6 +274,26 @@ impl From<PresetName> for Preset {
 }
 
 impl Args {
+    /// Where the files go.
+    fn output(&self) -> &Path {
+        self.output.as_deref().unwrap_or(Path::new("baked"))
+    }
+
+    /// What the flags say about a folder.
+    fn hints(&self) -> Hints {
+        Hints {
+            green: self.green(),
+            direction_span: self.direction_span.map(f32::to_radians),
+            maps: self.map.clone(),
+            ignore: self.ignore.clone(),
+            roughness_is_gloss: self.roughness_is_gloss,
+            roughness: self.roughness,
+            anisotropy: self.anisotropy,
+            force_normal: self.force_normal,
+            wrap: self.wrap(),
+        }
+    }
+
     /// A map's encoding: the role's measured default, changed by what flags say.
     fn encoding(&self, role: Role, format: Option<FormatName>) -> Encoding {
         let mut encoding = role.encoding();
@@ -318,18 +349,31 @@ impl Args {
 /// # Errors
 /// Whatever is wrong with the input, the flags or the output folder; nothing half-written stays.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    if args.input.is_file() && has_extension(&args.input, "toml") {
+        return bake_library(args, console);
+    }
+    if args.library != LibraryArgs::default() {
+        return Err(Error::Usage(
+            "--watch, --jobs and --cache need a kinran.toml; name one as the input".into(),
+        ));
+    }
     check_formats(args)?;
     if !args.dry_run {
-        check_folder(&args.output)?;
+        check_folder(args.output())?;
     }
     let gltf = has_extension(&args.input, "glb") || has_extension(&args.input, "gltf");
     if args.input.is_file() && !gltf {
         return Err(Error::Usage(format!(
-            "{}: is neither a folder of maps nor a .glb or .gltf; name one of these",
+            "{}: is neither a folder of maps, a .glb or .gltf, nor a kinran.toml; name one of these",
             args.input.display()
         )));
     }
-    if gltf && !args.input.is_dir() { bake_gltf(args, console) } else { bake_folder(args, console) }
+    match (gltf && !args.input.is_dir(), args.dry_run) {
+        (false, false) => folder::run(args, console),
+        (false, true) => folder::dry_run(args, console),
+        (true, false) => gltf::run(args, console),
+        (true, true) => gltf::dry_run(args, console),
+    }
 }
 
 /// Refuses formats that have fewer channels than the map.
@@ -359,7 +403,7 @@ fn check_formats(args: &Args) -> Result<(), Error> {
 
 /// Writes a texture in the containers asked for; gives the reports of the files.
 fn write_texture(args: &Args, name: &str, map: &str, mut texture: Texture) -> Result<Vec<Output>, Error> {
-    std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
+    std::fs::create_dir_all(args.output()).map_err(|e| kinran_image::Error::io(args.output(), e))?;
     texture.metadata.insert("KinranMap".into(), map.into());
     texture.metadata.insert("KinranFilter".into(), args.filter.name().into());
     args.container
@@ -367,7 +411,7 @@ fn write_texture(args: &Args, name: &str, map: &str, mut texture: Texture) -> Re
         .iter()
         .map(|extension| {
             let file = format!("{name}.{extension}");
-            let path = args.output.join(&file);
+            let path = args.output().join(&file);
             let bytes = match *extension {
                 "dds" => encode_dds(&texture)?,
                 _ => encode_ktx2(&texture, (args.zstd > 0).then_some(args.zstd))?,

@@ -47,6 +47,14 @@ impl Console {
         let _ = writeln!(stderr(), "error: {line}");
     }
 
+    /// Tells why a command failed, and shows the place in the file where there is one.
+    pub fn failure(&self, error: &Error) {
+        self.error(error);
+        if let Some(snippet) = error.snippet() {
+            let _ = writeln!(stderr(), "{snippet}");
+        }
+    }
+
     /// Progress bars that show unless quiet or JSON is asked for.
     pub fn progress(&self) -> Progress {
         Progress::new(!self.quiet && !self.json)

@@ -13,6 +13,17 @@ pub enum Error {
     /// A folder of maps could not be understood.
     #[error(transparent)]
     Folder(#[from] kinran_bake::folder::FolderError),
+    /// A manifest says what no manifest says.
+    #[error(transparent)]
+    Manifest(#[from] kinran_bake::manifest::ManifestError),
+    /// Entries of a manifest failed; each has told why.
+    #[error("{failed} of {of} entries failed; the others are done")]
+    Entries {
+        /// How many.
+        failed: usize,
+        /// Of how many.
+        of: usize,
+    },
     /// A picture could not be rendered.
     #[error(transparent)]
     Render(#[from] kinran_render::Error),
@@ -24,7 +35,24 @@ pub enum Error {
     Internal(String),
 }
 
+impl From<kinran_bake::manifest::ReadError> for Error {
+    fn from(error: kinran_bake::manifest::ReadError) -> Self {
+        match error {
+            kinran_bake::manifest::ReadError::Image(error) => error.into(),
+            kinran_bake::manifest::ReadError::Manifest(error) => error.into(),
+        }
+    }
+}
+
 impl Error {
+    /// What to show below the message: the place in a manifest.
+    pub fn snippet(&self) -> Option<&str> {
+        match self {
+            Error::Manifest(error) => Some(&error.snippet),
+            _ => None,
+        }
+    }
+
     /// 2 where the input or the flags are to blame, 1 where the program is.
     pub fn exit_code(&self) -> u8 {
         match self {

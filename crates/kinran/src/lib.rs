@@ -4,6 +4,7 @@
 //! as a function that other commands can call.
 
 pub mod bake;
+pub mod cache;
 pub mod compare;
 mod compare_sheet;
 mod console;

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 #[cfg(feature = "view")]
 use kinran::viewer;
-use kinran::{Console, Error, bake, compare, demo, detail, inspect, render, shaders, skin_lut};
+use kinran::{Console, Error, bake, cache, compare, demo, detail, inspect, render, shaders, skin_lut};
 
 /// Anisotropic materials from authored maps to pictures.
 #[derive(Parser)]
@@ -41,7 +41,8 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Demo(demo::Args),
-    Bake(bake::Args),
+    Bake(Box<bake::Args>),
+    Cache(cache::Args),
     Render(render::Args),
     Compare(compare::Args),
     Detail(detail::Args),
@@ -58,7 +59,7 @@ fn main() -> ExitCode {
     match start_threads(cli.threads).and_then(|()| run(&cli.command, &console)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            console.error(&error);
+            console.failure(&error);
             ExitCode::from(error.exit_code())
         }
     }
@@ -68,6 +69,7 @@ fn run(command: &Command, console: &Console) -> Result<(), Error> {
     match command {
         Command::Demo(args) => demo::run(args, console),
         Command::Bake(args) => bake::run(args, console),
+        Command::Cache(args) => cache::run(args, console),
         Command::Render(args) => render::run(args, console),
         Command::Compare(args) => compare::run(args, console),
         Command::Detail(args) => detail::run(args, console),

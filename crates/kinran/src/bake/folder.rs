@@ -1,7 +1,7 @@
 //! A folder of authored maps.
 
 use kinran_bake::aniso::{Sheet, SheetRequest, bake_surface};
-use kinran_bake::folder::{Hints, LoadedMaterial, Role as MapRole, scan};
+use kinran_bake::folder::{LoadedMaterial, Role as MapRole, scan};
 use kinran_bake::{bake_plain, pack_channels};
 use kinran_image::{Image, Role, Transfer, full_level_count, level_size};
 use rayon::prelude::*;
@@ -10,30 +10,27 @@ use super::report::hash_file;
 use super::{Args, Form, Input, Output, Report, SurfaceReport, file_name, file_stem, write_texture};
 use crate::{Console, Error};
 
+/// Bakes a folder and tells what came of it.
+pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    let table = scan(&args.input, &args.hints())?.table();
+    let reports = bake_folder(args, console)?;
+    let files: String = reports.iter().map(|report| report.text(args.output())).collect();
+    console.result(&reports, &format!("{table}\n{files}"))
+}
+
+/// Tells what was understood of a folder.
+pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
+    let folder = scan(&args.input, &args.hints())?;
+    console.result(&folder, &folder.table())
+}
+
 /// Bakes every material found in a folder.
 ///
 /// # Errors
 /// See [`run`](super::run).
-pub fn bake_folder(args: &Args, console: &Console) -> Result<(), Error> {
-    let hints = Hints {
-        green: args.green(),
-        direction_span: args.direction_span.map(f32::to_radians),
-        maps: args.map.clone(),
-        ignore: args.ignore.clone(),
-        roughness_is_gloss: args.roughness_is_gloss,
-        roughness: args.roughness,
-        anisotropy: args.anisotropy,
-        force_normal: args.force_normal,
-        wrap: args.wrap(),
-    };
-    let folder = scan(&args.input, &hints)?;
-    if args.dry_run {
-        return console.result(&folder, &folder.table());
-    }
-
+pub fn bake_folder(args: &Args, console: &Console) -> Result<Vec<Report>, Error> {
     let mut reports = Vec::new();
-    let mut text = folder.table() + "\n";
-    for maps in &folder.materials {
+    for maps in &scan(&args.input, &args.hints())?.materials {
         let loaded = maps.load()?;
         for note in &loaded.notes {
             console.warn(note);
@@ -41,11 +38,10 @@ pub fn bake_folder(args: &Args, console: &Console) -> Result<(), Error> {
         let mut report = Report::new(args);
         report.warnings.clone_from(&loaded.notes);
         report.surfaces.push(bake_material(args, console, &loaded)?);
-        report.write(&args.output.join(format!("{}.kinran.json", file_stem(&loaded.name))))?;
-        text += &report.text(&args.output);
+        report.write(&args.output().join(format!("{}.kinran.json", file_stem(&loaded.name))))?;
         reports.push(report);
     }
-    console.result(&reports, &text)
+    Ok(reports)
 }
 
 fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> Result<SurfaceReport, Error> {

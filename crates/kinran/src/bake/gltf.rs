@@ -16,6 +16,16 @@ use super::{
 };
 use crate::{Console, Error};
 
+/// Bakes a glTF file and tells what came of it.
+pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    let report = bake_gltf(args, console)?;
+    for warning in &report.warnings {
+        console.warn(warning);
+    }
+    let model = args.output().join(file_name(&args.input));
+    console.result(&report, &format!("{}{}\n", report.text(args.output()), model.display()))
+}
+
 /// Bakes every material of a glTF file that has a normal or an anisotropy map.
 ///
 /// Each baked texture keeps a PNG or JPEG of level 0 as the fallback that glTF wants: the original image, or,
@@ -23,10 +33,10 @@ use crate::{Console, Error};
 ///
 /// # Errors
 /// See [`run`](super::run).
-pub fn bake_gltf(args: &Args, console: &Console) -> Result<(), Error> {
-    let output = args.output.join(file_name(&args.input));
+pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
+    let output = args.output().join(file_name(&args.input));
     let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
-    if !args.dry_run && same(&output, &args.input) {
+    if same(&output, &args.input) {
         return Err(Error::Usage(format!(
             "{}: the baked model would overwrite it; name another folder with --output",
             args.input.display()
@@ -39,15 +49,40 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<(), Error> {
     let mut document = Document::open(&input)?;
     curvature::mark_skin(&args.curvature, &mut scene, &mut document)?;
     let mut report = Report::new(args);
-    report.warnings.clone_from(&scene.warnings);
+    let surfaces = surfaces(args, &scene, &document, &mut report);
+    std::fs::create_dir_all(args.output()).map_err(|e| kinran_image::Error::io(args.output(), e))?;
 
-    // Materials that share a surface share its textures.
+    let stem = args.input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    let mut names = Names::default();
+    for (_, materials, surface) in &surfaces {
+        let name = names.unique(&format!("{stem}_{}", file_stem(&scene.materials[materials[0]].name)));
+        let mut baker = SurfaceBaker { args, console, scene: &scene, document: &mut document, name };
+        report.surfaces.push(baker.bake(materials, surface)?);
+    }
+    if args.all_textures {
+        bake_colors(args, &scene, &mut document, &mut names, &stem, &mut report)?;
+    }
+    report.curvature = curvature::bake(args, console, &scene, &mut document, &mut report.warnings)?;
+
+    report.warnings.extend(document.write(&output)?);
+    report.write(&args.output().join(format!("{stem}.kinran.json")))?;
+    Ok(report)
+}
+
+/// The surfaces of a document's materials; materials that share one share its textures.
+fn surfaces(
+    args: &Args,
+    scene: &Scene,
+    document: &Document,
+    report: &mut Report,
+) -> Vec<(Key, Vec<usize>, MaterialSurface)> {
+    report.warnings.clone_from(&scene.warnings);
     let mut surfaces: Vec<(Key, Vec<usize>, MaterialSurface)> = Vec::new();
     // A document without materials has one in the scene that it cannot name.
     for material in 0..document.material_count().min(scene.materials.len()) {
-        match material_surface(&scene, material) {
+        match material_surface(scene, material) {
             Ok(surface) => {
-                let key = Key::new(&scene, material);
+                let key = Key::new(scene, material);
                 match surfaces.iter_mut().find(|(known, ..)| *known == key) {
                     Some((_, materials, _)) => materials.push(material),
                     None => surfaces.push((key, vec![material], surface)),
@@ -64,30 +99,7 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<(), Error> {
             args.input.display()
         ));
     }
-    if args.dry_run {
-        return dry_run(&scene, &surfaces, &report, console);
-    }
-    std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
-
-    let stem = args.input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-    let mut names = Names::default();
-    for (_, materials, surface) in &surfaces {
-        let name = names.unique(&format!("{stem}_{}", file_stem(&scene.materials[materials[0]].name)));
-        let mut baker = SurfaceBaker { args, console, scene: &scene, document: &mut document, name };
-        report.surfaces.push(baker.bake(materials, surface)?);
-    }
-    if args.all_textures {
-        bake_colors(args, &scene, &mut document, &mut names, &stem, &mut report)?;
-    }
-
-    report.curvature = curvature::bake(args, console, &scene, &mut document, &mut report.warnings)?;
-
-    report.warnings.extend(document.write(&output)?);
-    report.write(&args.output.join(format!("{stem}.kinran.json")))?;
-    for warning in &report.warnings {
-        console.warn(warning);
-    }
-    console.result(&report, &format!("{}{}\n", report.text(&args.output), output.display()))
+    surfaces
 }
 
 /// What makes two materials' surfaces the same.
@@ -258,7 +270,7 @@ impl SurfaceBaker<'_> {
         let source = match fallback {
             Some(level_0) => {
                 let file = format!("{name}.png");
-                let path = self.args.output.join(&file);
+                let path = self.args.output().join(&file);
                 refuse_authored(self.document, &path)?;
                 write_png(&path, &image_of(&level_0)?)?;
                 Some(self.document.add_image_file(&file))
@@ -436,12 +448,7 @@ fn bake_colors(
 }
 
 /// Says which materials would be baked from what.
-fn dry_run(
-    scene: &Scene,
-    surfaces: &[(Key, Vec<usize>, MaterialSurface)],
-    report: &Report,
-    console: &Console,
-) -> Result<(), Error> {
+pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
     #[derive(serde::Serialize)]
     struct Row<'a> {
         materials: Vec<&'a str>,
@@ -449,6 +456,10 @@ fn dry_run(
         height: u32,
         anisotropic: bool,
     }
+    let scene = Scene::load(&args.input)?;
+    let document = Document::open(&args.input)?;
+    let mut report = Report::new(args);
+    let surfaces = surfaces(args, &scene, &document, &mut report);
     let rows: Vec<Row> = surfaces
         .iter()
         .map(|(_, materials, surface)| Row {

@@ -1,0 +1,92 @@
+//! `kinran cache`: what is kept of finished work, and room again.
+
+use std::path::{Path, PathBuf};
+
+use kinran_bake::cache::{Cache, Listed};
+use kinran_bake::manifest::size;
+use serde::Serialize;
+
+use crate::bake::{LibraryArgs, cache_folder};
+use crate::table::list;
+use crate::{Console, Error};
+
+/// Shows what `kinran bake kinran.toml` keeps of finished work, and makes room
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  kinran cache
+  kinran cache --keep \"2 GiB\"
+  kinran cache --clean
+
+Nothing is lost by cleaning but time: what is needed again is baked again.")]
+pub struct Args {
+    /// The cache [default: KINRAN_CACHE, else the user's cache folder]
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+
+    /// Removes the entries that were not used for longest until the rest fit
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub keep: Option<u64>,
+
+    /// Removes everything
+    #[arg(long, conflicts_with = "keep")]
+    pub clean: bool,
+}
+
+/// What a cache holds.
+#[derive(Clone, Debug, Serialize)]
+pub struct CacheReport {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Bytes of all entries.
+    pub bytes: u64,
+    /// The entries, the one used last first.
+    pub entries: Vec<Listed>,
+    /// Entries that were removed now.
+    pub removed: usize,
+    /// Their bytes.
+    pub removed_bytes: u64,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Error::Usage`] where there is no cache, [`Error::Image`] where it cannot be read or changed.
+pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    let library = LibraryArgs { cache: args.cache.clone(), ..LibraryArgs::default() };
+    let folder = cache_folder(&library, None, Path::new("."));
+    // Whoever looks for a cache in the wrong place should not find an empty one.
+    if !folder.join("entries").is_dir() {
+        if args.cache.is_some() {
+            return Err(Error::Usage(format!("{}: is no cache; name another folder", folder.display())));
+        }
+        let report =
+            CacheReport { folder: folder.clone(), bytes: 0, entries: vec![], removed: 0, removed_bytes: 0 };
+        return console.result(&report, &format!("{}: nothing is kept yet\n", folder.display()));
+    }
+    let cache = Cache::new(&folder);
+    let limit = if args.clean { Some(0) } else { args.keep };
+    let (removed, removed_bytes) = limit.map_or(Ok((0, 0)), |limit| cache.evict(limit))?;
+    let entries = cache.list()?;
+    let bytes = entries.iter().map(|entry| entry.bytes).sum();
+
+    let mut text = list(&entries.iter().map(row).collect::<Vec<_>>());
+    if removed > 0 {
+        text += &format!("{removed} entries removed, {}\n", mib(removed_bytes));
+    }
+    text += &format!("{} entries, {}, in {}\n", entries.len(), mib(bytes), folder.display());
+    console.result(&CacheReport { folder, bytes, entries, removed, removed_bytes }, &text)
+}
+
+fn row(entry: &Listed) -> Vec<String> {
+    let days = entry.idle_seconds / 86400;
+    let idle = match days {
+        0 => "used today".into(),
+        1 => "used yesterday".into(),
+        days => format!("used {days} days ago"),
+    };
+    vec![entry.key[..entry.key.len().min(12)].into(), mib(entry.bytes), idle, entry.name.clone()]
+}
+
+fn mib(bytes: u64) -> String {
+    format!("{:.1} MiB", bytes as f64 / (1 << 20) as f64)
+}

@@ -1,0 +1,422 @@
+//! `kinran bake kinran.toml`: libraries of tiny maps, baked, changed, interrupted and shared.
+
+#[allow(dead_code, reason = "shared with the other commands' tests")]
+#[path = "commands/common.rs"]
+mod common;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use common::{bumps, glb, kinran, text};
+use kinran_image::{Channels, Image, Pixels, encode_png};
+use serde_json::Value;
+
+/// A library in a folder of its own, with its cache.
+struct Library {
+    root: tempfile::TempDir,
+}
+
+/// A normal map of 8² texels that differs from others by `seed`.
+fn normals(seed: u8) -> Vec<u8> {
+    let whole = bumps();
+    let samples = (0..64).flat_map(|i| {
+        let texel = whole.texel((i % 8 + u32::from(seed) * 3) % 32, (i / 8 + u32::from(seed)) % 32);
+        texel.map(|v| (v * 255.0) as u8)[..3].to_vec()
+    });
+    encode_png(&Image::new(8, 8, Channels::Rgb, Pixels::U8(samples.collect())).unwrap()).unwrap()
+}
+
+impl Library {
+    /// `count` folders of maps, one model, and a manifest that lists them.
+    fn new(count: u8) -> Library {
+        let library = Library { root: tempfile::tempdir().unwrap() };
+        for seed in 0..count {
+            let folder = library.path(&format!("materials/cloth{seed:02}"));
+            fs::create_dir_all(&folder).unwrap();
+            fs::write(folder.join("normal.png"), normals(seed)).unwrap();
+        }
+        fs::write(library.path("square.glb"), glb()).unwrap();
+        library.describe(
+            "[[aniso]]\ninput = \"materials/*\"\n[[mesh]]\ninput = \"*.glb\"\noutput = \"models\"\n",
+        );
+        library
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.root.path().join(name)
+    }
+
+    fn describe(&self, entries: &str) {
+        fs::write(self.path("kinran.toml"), format!("cache = \"kept\"\n{entries}")).unwrap();
+    }
+
+    fn command(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinran"));
+        command.env_remove("KINRAN_CACHE").arg("bake").arg(self.path("kinran.toml")).args(args);
+        command
+    }
+
+    /// Runs a bake with `--json`; gives the exit code, the report and what was said beside it.
+    fn bake(&self, args: &[&str]) -> (Option<i32>, Value, String) {
+        let output = self.command(args).arg("--json").output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        let report =
+            serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("no JSON ({e}): {said}"));
+        (output.status.code(), report, said)
+    }
+
+    /// The statuses of a bake that must succeed, by entry.
+    fn statuses(&self, args: &[&str]) -> BTreeMap<String, String> {
+        let (code, report, said) = self.bake(args);
+        assert_eq!(code, Some(0), "{said}");
+        statuses(&report)
+    }
+
+    /// Every file of the output that is not hidden.
+    fn output(&self) -> BTreeMap<String, Vec<u8>> {
+        tree(&self.path("baked"))
+    }
+}
+
+fn statuses(report: &Value) -> BTreeMap<String, String> {
+    let entries = report["entries"].as_array().unwrap().iter();
+    entries.map(|e| (e["name"].as_str().unwrap().into(), e["status"].as_str().unwrap().into())).collect()
+}
+
+fn tree(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(&next).into_iter().flatten() {
+            let path = entry.unwrap().path();
+            let name = path.strip_prefix(folder).unwrap().to_str().unwrap().to_owned();
+            if name == ".kinran" {
+                continue;
+            }
+            if path.is_dir() {
+                folders.push(path)
+            } else {
+                drop(files.insert(name, fs::read(&path).unwrap()))
+            }
+        }
+    }
+    files
+}
+
+fn all(statuses: &BTreeMap<String, String>, wanted: &str) -> bool {
+    statuses.values().all(|status| status == wanted)
+}
+
+#[test]
+fn what_has_not_changed_is_baked_again() {
+    let library = Library::new(3);
+    assert!(all(&library.statuses(&["--dry-run"]), "would-bake"));
+    assert!(!library.path("baked").exists() && !library.path("kept").exists(), "a dry run wrote something");
+
+    let first = library.statuses(&[]);
+    assert!(first.len() == 4 && all(&first, "baked"), "{first:?}");
+    let output = library.output();
+    for file in ["cloth00/cloth00_normal.ktx2", "cloth00/cloth00.kinran.json", "models/square/square.glb"] {
+        assert!(output.contains_key(file), "{file} is missing from {:?}", output.keys());
+    }
+    assert!(all(&library.statuses(&[]), "up-to-date"));
+
+    // One input changes, then is saved again as it was.
+    let changed = library.path("materials/cloth01/normal.png");
+    fs::write(&changed, normals(9)).unwrap();
+    let after = library.statuses(&[]);
+    assert_eq!(after["materials/cloth01"], "baked", "{after:?}");
+    assert_eq!(after.values().filter(|s| *s == "up-to-date").count(), 3, "{after:?}");
+    assert_ne!(library.output(), output);
+    fs::write(&changed, normals(1)).unwrap();
+    assert_eq!(library.statuses(&[])["materials/cloth01"], "restored");
+    assert_eq!(library.output(), output);
+
+    // So does a flag, and what it no longer writes goes.
+    let entries = "[[aniso]]\ninput = \"materials/*\"\n[[mesh]]\ninput = \"*.glb\"\noutput = \"models\"\n";
+    library.describe(&format!("[defaults]\ncontainer = \"dds\"\n{entries}"));
+    assert!(all(&library.statuses(&[]), "baked"));
+    assert!(!library.output().keys().any(|file| file.ends_with(".ktx2")), "{:?}", library.output().keys());
+    library.describe(entries);
+    assert!(all(&library.statuses(&[]), "restored"));
+    assert_eq!(library.output(), output);
+}
+
+#[test]
+fn lost_files_stay_lost_and_damage_is_copied() {
+    let library = Library::new(2);
+    library.statuses(&[]);
+    let output = library.output();
+    fs::remove_file(library.path("baked/cloth00/cloth00_normal.ktx2")).unwrap();
+    fs::write(library.path("baked/cloth01/cloth01_normal.ktx2"), "not a texture").unwrap();
+    let after = library.statuses(&[]);
+    assert_eq!(
+        (after["materials/cloth00"].as_str(), after["materials/cloth01"].as_str()),
+        ("restored", "restored")
+    );
+    assert_eq!(library.output(), output);
+
+    // All that was kept is damaged: one byte in every file.
+    for entry in fs::read_dir(library.path("kept/entries")).unwrap() {
+        let files = entry.unwrap().path().join("files");
+        for name in tree(&files).into_keys() {
+            let mut bytes = fs::read(files.join(&name)).unwrap();
+            bytes[0] ^= 1;
+            fs::write(files.join(name), bytes).unwrap();
+        }
+    }
+    fs::remove_dir_all(library.path("baked")).unwrap();
+    assert!(all(&library.statuses(&[]), "baked"));
+    assert_eq!(library.output(), output);
+}
+
+#[test]
+fn a_library_holds_other_bytes_than_single_bakes() {
+    let library = Library::new(1);
+    library.statuses(&["--threads", "3"]);
+    let single = library.path("single");
+    let folder = library.path("materials/cloth00");
+    assert_eq!(kinran(&["bake", text(&folder), "-o", text(&single), "--threads", "1"]).code, Some(0));
+    assert_eq!(tree(&single), tree(&library.path("baked/cloth00")));
+    assert_eq!(
+        kinran(&["bake", text(&library.path("square.glb")), "-o", text(&library.path("one"))]).code,
+        Some(0)
+    );
+    assert_eq!(tree(&library.path("one")), tree(&library.path("baked/models/square")));
+}
+
+#[test]
+fn a_failing_entry_stops_the_others() {
+    let library = Library::new(3);
+    fs::write(library.path("materials/cloth01/normal.png"), "not an image").unwrap();
+    library.describe("[[aniso]]\ninput = [\"materials/*\", \"nowhere\"]\n");
+    let (code, report, said) = library.bake(&[]);
+    assert_eq!(code, Some(2), "{said}");
+    let found = statuses(&report);
+    assert_eq!(found["materials/cloth01"], "failed");
+    assert_eq!(found["kinran.toml:3:25"], "failed");
+    assert_eq!(found.values().filter(|status| *status == "baked").count(), 2, "{found:?}");
+    for part in ["materials/cloth01", "normal.png", "nowhere does not exist", "2 of 4 entries failed"] {
+        assert!(said.contains(part), "wanted {part:?} in {said}");
+    }
+    assert!(!library.path("baked/cloth01").exists(), "something of the failed entry was left");
+
+    fs::write(library.path("materials/cloth01/normal.png"), normals(1)).unwrap();
+    fs::create_dir(library.path("nowhere")).unwrap();
+    fs::write(library.path("nowhere/normal.png"), normals(4)).unwrap();
+    let found = library.statuses(&[]);
+    assert_eq!(found.values().filter(|status| *status == "baked").count(), 2, "{found:?}");
+}
+
+#[test]
+fn a_wrong_flag_is_found_while_baking() {
+    let library = Library::new(1);
+    for (entries, parts) in [
+        (
+            "[[aniso]]\ninput = \"materials/*\"\nfilter = \"best\"\n",
+            ["kinran.toml:4:10: ", "choose one of ml, linear"],
+        ),
+        ("[[aniso]]\ninput = \"materials/*\"\npreset = 3\n", ["kinran.toml:4:10: ", "fast, normal, best"]),
+        (
+            "[defaults]\nfilrer = \"ml\"\n[[mesh]]\ninput = \"*.glb\"\n",
+            ["kinran.toml:3:1: unknown key `filrer`", "zstd"],
+        ),
+        ("[[mesh]]\ninput = \"*.glb\"\nall-textures = 1\n", ["kinran.toml:4:1: ", "expected true or false"]),
+        (
+            "[[mesh]]\ninput = \"*.glb\"\nzstd = true\n",
+            ["kinran.toml:4:1: ", "expected a string or a number"],
+        ),
+        ("[[mesh]]\ninput = \"*.glb\"\nzstd = 99\n", ["kinran.toml:4:8: ", "0..=22"]),
+        (
+            "[[mesh]]\ninput = \"*.glb\"\nwatch = true\n",
+            ["kinran.toml:4:1: ", "on the command line as --watch"],
+        ),
+        (
+            "[[aniso]]\ninput = \"materials/*\"\ny-up = true\ny-down = true\n",
+            ["kinran.toml:3:9: ", "cannot be used with"],
+        ),
+    ] {
+        library.describe(entries);
+        let output = library.command(&[]).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{entries:?}: {said}");
+        for part in parts.iter().chain(&["error: ", " | ", "^"]) {
+            assert!(said.contains(part), "{entries:?}: wanted {part:?} in {said}");
+        }
+        assert!(!library.path("baked").exists(), "{entries:?}");
+    }
+    library.describe("[[mesh]]\ninput = \"*.glb\"\n");
+    let output = library.command(&["--filter", "linear"]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(2) && said.contains("move these flags to its [defaults]"), "{said}");
+}
+
+#[test]
+fn the_inputs_are_overwritten() {
+    let library = Library::new(1);
+    let before = tree(&library.path("materials"));
+    library.describe("output = \".\"\n[[aniso]]\ninput = \"materials/cloth00\"\noutput = \"materials\"\n");
+    // Nothing in the folder is called as what would be written: that is no reason to fail.
+    library.statuses(&[]);
+    assert!(before.iter().all(|(name, bytes)| tree(&library.path("materials"))[name] == *bytes));
+
+    fs::create_dir(library.path("square")).unwrap();
+    fs::rename(library.path("square.glb"), library.path("square/square.glb")).unwrap();
+    let model = fs::read(library.path("square/square.glb")).unwrap();
+    library.describe("output = \".\"\n[[mesh]]\ninput = \"square/square.glb\"\n");
+    let (code, _, said) = library.bake(&[]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("lies among the inputs and would be overwritten"), "{said}");
+    assert_eq!(fs::read(library.path("square/square.glb")).unwrap(), model);
+}
+
+#[test]
+fn a_cache_grows_without_limit() {
+    let library = Library::new(4);
+    library.statuses(&[]);
+    let kept = || fs::read_dir(library.path("kept/entries")).unwrap().count();
+    assert_eq!(kept(), 5);
+    let cache = library.path("kept");
+    let listed = common::kinran_json(&["cache", "--cache", text(&cache)]);
+    assert_eq!(listed["entries"].as_array().unwrap().len(), 5);
+    let bytes = listed["bytes"].as_u64().unwrap();
+
+    // The limit of the manifest holds after the next run that bakes something.
+    let entries = "[[aniso]]\ninput = \"materials/*\"\n[[mesh]]\ninput = \"*.glb\"\noutput = \"models\"\n";
+    library.describe(&format!("cache-limit = \"{}\"\n{entries}", bytes / 2));
+    fs::write(library.path("materials/cloth03/normal.png"), normals(7)).unwrap();
+    library.statuses(&[]);
+    assert!(kept() < 5, "{} entries are kept", kept());
+    let newest = common::kinran_json(&["cache", "--cache", text(&cache)]);
+    assert_eq!(newest["entries"][0]["name"], "materials/cloth03", "{newest}");
+    assert!(newest["bytes"].as_u64().unwrap() <= bytes / 2, "{newest}");
+    assert!(all(&library.statuses(&[]), "up-to-date"), "what stands needs no cache");
+
+    let cleaned = common::kinran_json(&["cache", "--cache", text(&cache), "--clean"]);
+    assert_eq!((kept(), cleaned["bytes"].as_u64()), (0, Some(0)));
+    assert!(cleaned["removed"].as_u64().unwrap() > 0, "{cleaned}");
+    assert_eq!(kinran(&["cache", "--cache", text(&library.path("materials"))]).code, Some(2));
+}
+
+#[test]
+fn processes_that_share_a_library_disturb_each_other() {
+    let library = Library::new(6);
+    library.statuses(&[]);
+    let alone = library.output();
+    fs::remove_dir_all(library.path("baked")).unwrap();
+    fs::remove_dir_all(library.path("kept")).unwrap();
+    let start = || library.command(&["--quiet"]).stderr(Stdio::piped()).spawn().unwrap();
+    let together: Vec<Child> = (0..4).map(|_| start()).collect();
+    for process in together {
+        let output = process.wait_with_output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+    assert_eq!(library.output(), alone);
+    assert!(all(&library.statuses(&[]), "up-to-date"));
+}
+
+#[test]
+fn a_killed_bake_leaves_half_a_file_or_loses_a_whole_one() {
+    let library = Library::new(8);
+    let started = Instant::now();
+    library.statuses(&["--threads", "2"]);
+    let undisturbed = started.elapsed();
+    let wanted = library.output();
+    let wipe = || {
+        fs::remove_dir_all(library.path("baked")).unwrap_or_default();
+        fs::remove_dir_all(library.path("kept")).unwrap_or_default();
+    };
+    let finished = || -> Vec<String> {
+        let homes = fs::read_dir(library.path("kept/entries")).into_iter().flatten();
+        let mut keys: Vec<String> =
+            homes.map(|home| home.unwrap().file_name().into_string().unwrap()).collect();
+        keys.sort();
+        keys
+    };
+
+    let (mut state, mut killed, mut between, mut resumed) = (1_u32, 0, 0, 0);
+    wipe();
+    while killed < 100 {
+        let before = finished();
+        let mut process =
+            library.command(&["--threads", "2"]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        std::thread::sleep(undisturbed.mul_f64(f64::from(state >> 8) / f64::from(1 << 24) * 0.7));
+        let done = process.try_wait().unwrap().is_some();
+        // SIGKILL, which a process can neither see coming nor survive.
+        process.kill().unwrap_or_default();
+        process.wait().unwrap();
+        killed += u32::from(!done);
+
+        let output = library.output();
+        for (name, bytes) in &output {
+            assert!(
+                wanted.get(name) == Some(bytes),
+                "kill {killed}: {name} is not whole or does not belong there"
+            );
+        }
+        let after = finished();
+        assert!(before.iter().all(|key| after.contains(key)), "kill {killed}: finished work was lost");
+        between += u32::from(!after.is_empty() && after.len() < 9);
+        // Now and then go on to the end; what was finished is not baked again.
+        if done || after.len() == 9 {
+            let last = library.statuses(&[]);
+            let baked = last.values().filter(|status| *status == "baked").count();
+            assert_eq!(baked, 9 - after.len(), "kill {killed}: {last:?}");
+            assert_eq!(library.output(), wanted);
+            resumed += 1;
+            wipe();
+        }
+    }
+    assert!(between > 10 && resumed > 1, "{between} kills were between entries, {resumed} bakes resumed");
+
+    library.statuses(&[]);
+    assert_eq!(library.output(), wanted);
+    for folder in ["kept/work", "baked/.kinran/work"] {
+        let left: Vec<String> =
+            tree(&library.path(folder)).into_keys().filter(|name| name != "gate").collect();
+        assert!(left.is_empty(), "{folder} still holds {left:?}");
+    }
+}
+
+/// Waits until `done`, at most half a minute.
+fn wait(what: &str, done: impl Fn() -> bool) {
+    let started = Instant::now();
+    while !done() {
+        assert!(started.elapsed() < Duration::from_secs(30), "waited in vain for {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn a_saved_input_is_not_noticed() {
+    struct Watching(Child);
+    impl Drop for Watching {
+        fn drop(&mut self) {
+            self.0.kill().unwrap_or_default();
+            self.0.wait().map(drop).unwrap_or_default();
+        }
+    }
+    let library = Library::new(1);
+    library.statuses(&[]);
+    let first = library.output();
+    let input = library.path("materials/cloth00/normal.png");
+    let _watching =
+        Watching(library.command(&["--watch"]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    fs::write(&input, normals(5)).unwrap();
+    wait("a changed map", || {
+        library.output()["cloth00/cloth00_normal.ktx2"] != first["cloth00/cloth00_normal.ktx2"]
+    });
+    // A file that is no image for a moment does not end the watch.
+    fs::write(&input, "half").unwrap();
+    std::thread::sleep(Duration::from_millis(700));
+    fs::write(&input, normals(0)).unwrap();
+    wait("the old map", || library.output() == first);
+    let folder = library.path("materials/cloth01");
+    fs::create_dir(&folder).unwrap();
+    fs::write(folder.join("normal.png"), normals(3)).unwrap();
+    wait("a new folder", || library.output().contains_key("cloth01/cloth01_normal.ktx2"));
+}
