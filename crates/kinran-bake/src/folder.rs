@@ -50,7 +50,7 @@ pub use load::{LoadedMap, LoadedMaterial};
 pub use names::{Green, Role};
 
 /// Extensions of files that are read.
-const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "tga", "tif", "tiff", "exr", "hdr"];
+pub(crate) const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "tga", "tif", "tiff", "exr", "hdr"];
 
 /// Roughness of a surface for which nothing gives any: the middle of the range, chosen by eye.
 pub const ASSUMED_ROUGHNESS: f32 = 0.5;

@@ -14,6 +14,14 @@
 //! input = ["models/*.glb", "props/**/*.gltf"]
 //! output = "models"
 //! all-textures = true
+//!
+//! [tile.steel]                   # a tile that layers call by its name
+//! file = "tiles/steel_color.png"
+//! scale = 4
+//!
+//! [[detail]]                     # targets, solved against their layers: flags of `kinran detail solve`
+//! input = "targets/helmet_color.png"
+//! layer = [{ tile = "steel" }, { tile = "tiles/rust.png", scale = 9, mask = "masks.png", channel = "g" }]
 //! ```
 //!
 //! Every input becomes a [`Job`] with a folder of its own, `output` of the file, `output` of the entry and the
@@ -21,13 +29,15 @@
 //! here they are names and values with their places, for [`Manifest::error`].
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+use crate::folder::EXTENSIONS;
 
 /// Bytes of the manifest's text.
 pub type Place = Range<usize>;
@@ -56,16 +66,19 @@ pub enum Kind {
     Aniso,
     /// glTF files.
     Mesh,
+    /// Targets of detail maps.
+    Detail,
 }
 
 impl Kind {
-    const ALL: [Kind; 2] = [Kind::Aniso, Kind::Mesh];
+    const ALL: [Kind; 3] = [Kind::Aniso, Kind::Mesh, Kind::Detail];
 
     /// The name of its entries: `[[name]]`.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Aniso => "aniso",
             Kind::Mesh => "mesh",
+            Kind::Detail => "detail",
         }
     }
 
@@ -74,6 +87,7 @@ impl Kind {
         match self {
             Kind::Aniso => "a folder of maps",
             Kind::Mesh => "a .glb or .gltf file",
+            Kind::Detail => "an image",
         }
     }
 
@@ -82,6 +96,7 @@ impl Kind {
         match self {
             Kind::Aniso => path.is_dir(),
             Kind::Mesh => path.is_file() && (is("glb") || is("gltf")),
+            Kind::Detail => path.is_file() && EXTENSIONS.into_iter().any(is),
         }
     }
 }
@@ -95,6 +110,8 @@ pub struct Setting {
     pub place: Place,
     /// Its value.
     pub value: SettingValue,
+    /// It stands in `[defaults]`, whose flags go to the entries that know them.
+    pub is_default: bool,
 }
 
 /// The value of a flag.
@@ -144,8 +161,13 @@ pub struct Manifest {
     pub cache: Option<PathBuf>,
     /// Bytes that the cache may hold, where the manifest says it.
     pub cache_limit: Option<u64>,
+    /// By name: the file, and what a layer of it says unless it says otherwise.
+    tiles: BTreeMap<String, (String, Parts)>,
     entries: Vec<Entry>,
 }
+
+/// Names and values of a layer.
+type Parts = Vec<(String, String)>;
 
 impl Manifest {
     /// Reads a manifest.
@@ -169,6 +191,7 @@ impl Manifest {
             output: beside(path).join("baked"),
             cache: None,
             cache_limit: None,
+            tiles: BTreeMap::new(),
             entries: Vec::new(),
         };
         let text = manifest.text.clone();
@@ -177,6 +200,17 @@ impl Manifest {
             manifest.error(&e.span().unwrap_or(0..0), format!("this is not TOML: {expected}"))
         })?;
 
+        // Layers call tiles by name, wherever those stand.
+        if let Some((_, value)) = table.get_ref().iter().find(|(key, _)| key.get_ref() == "tile") {
+            for (key, value) in manifest.table(value)? {
+                let mut tile = manifest.parts(value)?;
+                let Some(file) = tile.iter().position(|(name, _)| name == "file") else {
+                    return Err(manifest.error(&key.span(), "this tile has no `file`".into()));
+                };
+                let file = tile.remove(file).1;
+                manifest.tiles.insert(key.get_ref().to_string(), (file, tile));
+            }
+        }
         let mut defaults = Vec::new();
         for (key, value) in table.get_ref() {
             match key.get_ref().as_ref() {
@@ -188,16 +222,17 @@ impl Manifest {
                 }
                 "defaults" => {
                     for (key, value) in manifest.table(value)? {
-                        defaults.push(manifest.setting(key, value)?);
+                        defaults.push(Setting { is_default: true, ..manifest.setting(key, value)? });
                     }
                 }
+                "tile" => {}
                 name => {
                     let Some(kind) = Kind::ALL.into_iter().find(|kind| kind.name() == name) else {
                         let kinds = Kind::ALL.map(|kind| format!("[[{}]]", kind.name())).join(", ");
                         return Err(manifest.error(
                             &key.span(),
                             format!(
-                                "unknown key `{name}`; expected output, cache, cache-limit, [defaults], {kinds}"
+                                "unknown key `{name}`; expected output, cache, cache-limit, [defaults], [tile.NAME], {kinds}"
                             ),
                         ));
                     };
@@ -225,11 +260,6 @@ impl Manifest {
     /// The manifest's path.
     pub fn path(&self) -> &Path {
         &self.path
-    }
-
-    /// The settings of every entry, each as often as an entry has it.
-    pub fn settings(&self) -> impl Iterator<Item = &Setting> {
-        self.entries.iter().flat_map(|entry| &entry.settings)
     }
 
     /// An error about a place in the manifest.
@@ -286,7 +316,7 @@ impl Manifest {
     ) -> Result<Job, ManifestError> {
         let name = match entry.kind {
             Kind::Aniso => input.file_name(),
-            Kind::Mesh => input.file_stem(),
+            Kind::Mesh | Kind::Detail => input.file_stem(),
         };
         let Some(name) = name.map(PathBuf::from) else {
             return Err(
@@ -460,6 +490,7 @@ impl Manifest {
             DeValue::String(text) => Ok((text.to_string(), value.span())),
             DeValue::Integer(number) => Ok((number.to_string(), value.span())),
             DeValue::Float(number) => Ok((number.to_string(), value.span())),
+            DeValue::Table(_) if key.get_ref() == "layer" => Ok((self.layer(value)?, value.span())),
             other => Err(self.error(
                 &value.span(),
                 format!("expected a string, a number, true, false or an array, found {}", kind_of(other)),
@@ -470,7 +501,54 @@ impl Manifest {
             DeValue::Array(values) => SettingValue::Texts(values.iter().map(text).collect::<Result<_, _>>()?),
             _ => SettingValue::Texts(vec![text(value)?]),
         };
-        Ok(Setting { name: key.get_ref().to_string(), place: key.span(), value })
+        Ok(Setting { name: key.get_ref().to_string(), place: key.span(), value, is_default: false })
+    }
+
+    /// A layer's table as the flag: `FILE,NAME=VALUE,...`.
+    fn layer(&self, value: &Spanned<DeValue>) -> Result<String, ManifestError> {
+        let mut parts = self.parts(value)?;
+        let Some(tile) = parts.iter().position(|(name, _)| name == "tile") else {
+            let expected = "this layer has no `tile`; expected a file or the name of a [tile.NAME]";
+            return Err(self.error(&value.span(), expected.into()));
+        };
+        let mut file = parts.remove(tile).1;
+        if let Some((of, defaults)) = self.tiles.get(&file) {
+            file.clone_from(of);
+            let own: BTreeSet<String> = parts.iter().map(|(name, _)| name.clone()).collect();
+            parts.extend(defaults.iter().filter(|(name, _)| !own.contains(name)).cloned());
+        }
+        let parts = parts.into_iter().map(|(name, value)| match value.as_str() {
+            "" => format!(",{name}"),
+            value => format!(",{name}={value}"),
+        });
+        Ok(file + &parts.collect::<String>())
+    }
+
+    /// The names and values of a table; of a switch that is on, no value.
+    fn parts(&self, value: &Spanned<DeValue>) -> Result<Parts, ManifestError> {
+        let mut parts = Parts::new();
+        for (key, value) in self.table(value)? {
+            let text = match value.get_ref() {
+                DeValue::String(text) if text.contains(',') => {
+                    return Err(
+                        self.error(&value.span(), "a comma cannot stand here; rename the file".into())
+                    );
+                }
+                DeValue::String(text) => text.to_string(),
+                DeValue::Integer(number) => number.to_string(),
+                DeValue::Float(number) => number.to_string(),
+                DeValue::Boolean(true) => String::new(),
+                DeValue::Boolean(false) => continue,
+                other => {
+                    return Err(self.error(
+                        &value.span(),
+                        format!("expected a string, a number, true or false, found {}", kind_of(other)),
+                    ));
+                }
+            };
+            parts.push((key.get_ref().to_string(), text));
+        }
+        Ok(parts)
     }
 }
 

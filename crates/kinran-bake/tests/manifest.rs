@@ -39,7 +39,7 @@ fn a_mistake_is_told_without_its_place_or_what_was_expected() {
     let mesh = "[[mesh]]\ninput = \"a.glb\"\n";
     for (text, line, column, expected) in [
         ("output = \n", 1, 10, "this is not TOML"),
-        ("[[aniso]\n", 1, 8, "this is not TOML"),
+        ("[[aniso]\n", 1, 9, "this is not TOML"),
         ("ouput = \"x\"\n", 1, 1, "unknown key `ouput`; expected output, cache"),
         ("# héllo\noutput = 3\n", 2, 10, "expected a string, found an integer"),
         ("cache-limit = \"much\"\n", 1, 15, "much is no size; write a number and a unit, such as 10 GiB"),
@@ -56,6 +56,10 @@ fn a_mistake_is_told_without_its_place_or_what_was_expected() {
         ),
         ("[[aniso]]\ninput = \"a\"\nexclude = \"a[\"\n", 3, 11, "a[ is no pattern"),
         ("defaults = 1\n[[mesh]]\ninput = \"a.glb\"\n", 1, 12, "expected a table, found an integer"),
+        ("[tile.a]\nscale = 2\n", 1, 7, "this tile has no `file`"),
+        ("[[detail]]\ninput = \"a\"\nlayer = [{ scale = 2 }]\n", 3, 10, "this layer has no `tile`"),
+        ("[[detail]]\ninput = \"a\"\nlayer = [{ tile = \"a,b\" }]\n", 3, 19, "a comma cannot stand here"),
+        ("[[detail]]\ninput = \"a\"\nlayer = [{ tile = [1] }]\n", 3, 19, "found an array"),
         ("", 1, 1, "nothing to bake; expected [[aniso]]"),
     ] {
         let (l, c, message, _) = refused(text);
@@ -99,8 +103,8 @@ fn an_input_that_is_not_there_stops_the_others() {
         errors,
         [
             at(10) + "materials/silk does not exist; expected a folder of maps",
-            at(46) + "models/notes.txt is not a folder of maps",
-            at(66) + "nowhere/* matches nothing; expected a folder of maps",
+            at(47) + "models/notes.txt is not a folder of maps",
+            at(67) + "nowhere/* matches nothing; expected a folder of maps",
         ]
     );
     assert_eq!(found[1].as_ref().unwrap().name, "materials/twill");

@@ -55,7 +55,7 @@ pub struct Args {
     #[arg(value_name = "INPUT")]
     pub input: PathBuf,
 
-    /// Where the files go; made if it is not there [default: baked, or what a kinran.toml says]
+    /// Where the files go; made if it is not there. A kinran.toml may say it instead
     #[arg(long, short, value_name = "DIR")]
     pub output: Option<PathBuf>,
 
@@ -356,6 +356,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         return Err(Error::Usage(
             "--watch, --jobs and --cache need a kinran.toml; name one as the input".into(),
         ));
+    }
+    if args.output.is_none() && !args.dry_run {
+        return Err(Error::Usage("--output is missing; say in which folder the files go".into()));
     }
     check_formats(args)?;
     if !args.dry_run {

@@ -19,7 +19,7 @@ struct Library {
     root: tempfile::TempDir,
 }
 
-/// A normal map of 8² texels that differs from others by `seed`.
+/// A normal map of 8² texels that differs from others by `seed`, 0 to 7.
 fn normals(seed: u8) -> Vec<u8> {
     let whole = bumps();
     let samples = (0..64).flat_map(|i| {
@@ -126,7 +126,7 @@ fn what_has_not_changed_is_baked_again() {
 
     // One input changes, then is saved again as it was.
     let changed = library.path("materials/cloth01/normal.png");
-    fs::write(&changed, normals(9)).unwrap();
+    fs::write(&changed, normals(6)).unwrap();
     let after = library.statuses(&[]);
     assert_eq!(after["materials/cloth01"], "baked", "{after:?}");
     assert_eq!(after.values().filter(|s| *s == "up-to-date").count(), 3, "{after:?}");
@@ -380,6 +380,43 @@ fn a_killed_bake_leaves_half_a_file_or_loses_a_whole_one() {
             tree(&library.path(folder)).into_keys().filter(|name| name != "gate").collect();
         assert!(left.is_empty(), "{folder} still holds {left:?}");
     }
+}
+
+#[test]
+fn a_target_is_solved_otherwise_than_by_hand() {
+    let library = Library::new(1);
+    let image = |name: &str, seed: u8| fs::write(library.path(name), normals(seed)).unwrap();
+    fs::create_dir(library.path("tiles")).unwrap();
+    [("wall.png", 1), ("tiles/brick.png", 2), ("tiles/moss.png", 3), ("mask.png", 4)]
+        .map(|(n, s)| image(n, s));
+    library.describe(
+        "[defaults]\npreset = \"fast\"\nfilter = \"linear\"\n[tile.brick]\nfile = \"tiles/brick.png\"\nscale = 2\n\
+         rotation = 30\n[[detail]]\ninput = \"wall.png\"\noutput = \"walls\"\nformat = \"bc1\"\nlayer = [\n\
+         { tile = \"brick\", rotation = 90 },\n{ tile = \"tiles/moss.png\", mirror = true, mask = \"mask.png\", \
+         channel = \"g\" }]\n",
+    );
+    assert!(all(&library.statuses(&[]), "baked"));
+    let by_hand = Command::new(env!("CARGO_BIN_EXE_kinran"))
+        .args(["detail", "solve", "wall.png", "--format", "bc1", "--preset", "fast", "-o", "by_hand"])
+        .args(["--layer", "tiles/brick.png,scale=2,rotation=90"])
+        .args(["--layer", "tiles/moss.png,mirror,mask=mask.png,channel=g"])
+        .current_dir(library.root.path())
+        .output()
+        .unwrap();
+    assert!(by_hand.status.success(), "{}", String::from_utf8_lossy(&by_hand.stderr));
+    assert_eq!(tree(&library.path("baked/walls/wall")), tree(&library.path("by_hand")));
+
+    assert!(all(&library.statuses(&[]), "up-to-date"));
+    image("mask.png", 5);
+    assert!(all(&library.statuses(&[]), "baked"));
+    image("tiles/brick.png", 6);
+    assert!(all(&library.statuses(&[]), "baked"));
+
+    library.describe("[[detail]]\ninput = \"wall.png\"\nlayer = [{ tile = \"a.png\", sclae = 2 }]\n");
+    let output = library.command(&[]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(2) && said.contains("kinran.toml:4:10: "), "{said}");
+    assert!(said.contains("a layer knows no sclae=2"), "{said}");
 }
 
 /// Waits until `done`, at most half a minute.

@@ -256,26 +256,41 @@ impl pulp::WithSimd for QuantiseBand<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        // Where nothing lies beside, in runs of a known length, so that the compiler finds vectors.
-        let runs = if self.beside.is_none() { self.out.len() / (4 * RUN) } else { 0 };
-        let (whole, rest) = self.out.split_at_mut(runs * 4 * RUN);
-        for (run, out) in whole.chunks_exact_mut(4 * RUN).enumerate() {
-            let TexelSpan { nx, ny, nz, axx, axy, ayy, .. } = self.texels;
-            let [nx, ny, nz, axx, axy, ayy] = [nx, ny, nz, axx, axy, ayy]
-                .map(|plane| *plane[run * RUN..].first_chunk::<RUN>().expect("a run"));
-            let mut planes = [[255; RUN]; 4];
-            for i in 0..RUN {
-                let a = Sym2 { xx: axx[i], xy: axy[i], yy: ayy[i] };
-                let [r, g, b] = self.sheet.encode(vec3(nx[i], ny[i], nz[i]), a);
-                (planes[0][i], planes[1][i], planes[2][i]) = (unorm8(r), unorm8(g), unorm8(b));
-            }
-            for (i, out) in out.chunks_exact_mut(4).enumerate() {
-                out.copy_from_slice(&planes.map(|plane| plane[i]));
+        // The two sheets of every folder get loops of their own, in which the compiler finds vectors.
+        match (self.sheet, self.beside) {
+            (Sheet::Normal, None) => self.quantise(|n, a| Sheet::Normal.encode(n, a)),
+            (Sheet::Aniso, None) => self.quantise(|n, a| Sheet::Aniso.encode(n, a)),
+            _ => {
+                for (i, out) in self.out.chunks_exact_mut(4).enumerate() {
+                    let rgba = texel(self.sheet, self.texels, i, self.beside, self.turn);
+                    out.copy_from_slice(&rgba.map(unorm8));
+                }
             }
         }
-        for (i, out) in (runs * RUN..).zip(rest.chunks_exact_mut(4)) {
-            let rgba = texel(self.sheet, self.texels, i, self.beside, self.turn);
-            out.copy_from_slice(&rgba.map(unorm8));
+    }
+}
+
+impl QuantiseBand<'_> {
+    /// Opaque texels, by a formula for their RGB.
+    #[inline(always)]
+    fn quantise(self, encode: impl Fn(Vec3, Sym2) -> [f32; 3]) {
+        let TexelSpan { nx, ny, nz, axx, axy, ayy, .. } = self.texels;
+        let mut run = [[0.0; RUN]; 6];
+        let mut rgb = [[0; RUN]; 3];
+        for (x0, out) in (0..).step_by(RUN).zip(self.out.chunks_mut(4 * RUN)) {
+            let len = out.len() / 4;
+            for (run, plane) in run.iter_mut().zip([nx, ny, nz, axx, axy, ayy]) {
+                run[..len].copy_from_slice(&plane[x0..x0 + len]);
+            }
+            let [nx, ny, nz, axx, axy, ayy] = &run;
+            for i in 0..RUN {
+                let a = Sym2 { xx: axx[i], xy: axy[i], yy: ayy[i] };
+                let texel = encode(vec3(nx[i], ny[i], nz[i]), a).map(unorm8);
+                (rgb[0][i], rgb[1][i], rgb[2][i]) = (texel[0], texel[1], texel[2]);
+            }
+            for (i, out) in out.as_chunks_mut().0.iter_mut().enumerate() {
+                *out = [rgb[0][i], rgb[1][i], rgb[2][i], 255];
+            }
         }
     }
 }

@@ -46,7 +46,7 @@ impl Sheet {
             Sheet::Aniso => {
                 // rho = 0 lies halfway between two bytes; rounding errors must not choose among them.
                 let [t, rho, b] = aniso_encode(a).to_array();
-                let tie = (rho - 0.5).abs() < 0.1 / 255.0 || a.xy.abs() < ROUNDING;
+                let tie = ((rho - 0.5).abs() < 0.1 / 255.0) | (a.xy.abs() < ROUNDING);
                 [t, if tie { 0.5 + 0.1 / 255.0 } else { rho }, b]
             }
             Sheet::Roughness => [1.0, khr(a).0, 1.0],

@@ -159,8 +159,9 @@ impl PlaneRows for Planes {
 /// length again.
 pub(crate) fn mip_chain(finest: Planes, kind: MapKind) -> Vec<Planes> {
     let size = (finest.width, finest.height);
-    let coarser =
-        reduce_levels(&finest, size, Kernel::Box, [Wrap::Repeat; 2], |band| (band.y0, band.samples.to_vec()));
+    let coarser = reduce_levels(&finest, size, Kernel::Box, [Wrap::Repeat; 2], |band, (): &mut ()| {
+        (band.y0, band.samples.to_vec())
+    });
     let coarser: Vec<Planes> = coarser
         .into_iter()
         .enumerate()

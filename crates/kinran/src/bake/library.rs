@@ -15,7 +15,9 @@ use kinran_scene::Document;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{Args, Report, bake_folder, bake_gltf, file_name, settings};
+use super::settings::{self, Flags};
+use super::{Args, Report, bake_folder, bake_gltf, file_name};
+use crate::detail::{SolveArgs, solve_target};
 use crate::table::list;
 use crate::{Console, Error};
 
@@ -214,12 +216,11 @@ impl Built {
 fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Built, Error> {
     let manifest = Manifest::read(&args.input)?;
     let mut entries: Vec<EntryReport> = Vec::new();
-    let mut work: Vec<(usize, Job, Args)> = Vec::new();
+    let mut work: Vec<(usize, Job, Flags)> = Vec::new();
     let output = args.output.clone().unwrap_or_else(|| manifest.output.clone());
     if !args.dry_run {
         crate::outputs::check_folder(&output)?;
     }
-    settings::check(&manifest)?;
     for job in manifest.jobs() {
         match job {
             Ok(job) => {
@@ -243,7 +244,7 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
         })
         .collect();
     drop(stage);
-    let mut todo: Vec<(usize, Key, Job, Args)> = Vec::new();
+    let mut todo: Vec<(usize, Key, Job, Flags)> = Vec::new();
     for ((at, job, flags), key) in work.into_iter().zip(keys) {
         match key {
             Err(error) => entries[at].fail(error.to_string()),
@@ -375,7 +376,7 @@ impl Library {
     }
 
     /// Hash of all that an entry's files depend on.
-    fn key(&self, job: &Job, flags: &Args) -> Result<Key, Error> {
+    fn key(&self, job: &Job, flags: &Flags) -> Result<Key, Error> {
         let mut parts: Vec<String> = vec![env!("CARGO_PKG_VERSION").into(), self.program()?, processor()];
         parts.push(job.kind.name().into());
         parts.extend(job.settings.iter().map(|setting| match &setting.value {
@@ -385,15 +386,21 @@ impl Library {
                 format!("{} {texts:?}", setting.name)
             }
         }));
-        match job.kind {
-            Kind::Aniso => {
+        match (job.kind, flags) {
+            (Kind::Aniso, Flags::Bake(flags)) => {
                 let folder = scan(&job.input, &flags.hints())?;
                 parts.push(serde_json::to_string(&folder.rows).map_err(|e| Error::Internal(e.to_string()))?);
                 for (role, path) in folder.materials.iter().flat_map(|material| &material.files) {
                     parts.push(format!("{} {} {}", role.name(), file_name(path), self.stamps.hash(path)?));
                 }
             }
-            Kind::Mesh => {
+            (_, Flags::Detail(flags)) => {
+                let layers = flags.layer.iter().flat_map(|layer| [Some(&layer.tile), layer.mask.as_ref()]);
+                for path in std::iter::once(&job.input).chain(layers.flatten()) {
+                    parts.push(format!("{} {}", file_name(path), self.stamps.hash(path)?));
+                }
+            }
+            (_, Flags::Bake(_)) => {
                 parts.push(format!("{} {}", file_name(&job.input), self.stamps.hash(&job.input)?));
                 let files = self.stamps.refers_to(&job.input, || -> Result<_, Error> {
                     Ok(Document::open(&job.input)?.files())
@@ -425,46 +432,64 @@ impl Library {
     }
 
     /// Brings an entry's files to the output, from the cache or by baking them into it first.
-    fn make(&self, job: &Job, key: &Key, flags: &Args, report: &mut EntryReport) -> Result<Status, Error> {
+    fn make(&self, job: &Job, key: &Key, flags: &Flags, report: &mut EntryReport) -> Result<Status, Error> {
         if let Some(entry) = self.cache.get(key)
-            && self.place(job, key, &entry, report)?
+            && let Some(copied) = self.place(job, key, &entry, report)?
         {
-            return Ok(Status::Restored);
+            return Ok(if copied == 0 { Status::UpToDate } else { Status::Restored });
         }
         // What is damaged is in the way.
         self.cache.remove(key)?;
         let work = self.cache.work_folder()?;
-        let flags = Args { input: job.input.clone(), output: Some(files_of(&work)), ..flags.clone() };
+        let output = files_of(&work);
         let silent = Console { quiet: true, json: false };
-        let reports = match job.kind {
-            Kind::Aniso => bake_folder(&flags, &silent)?,
-            Kind::Mesh => vec![bake_gltf(&flags, &silent)?],
+        let reports = match flags {
+            Flags::Bake(flags) => {
+                let flags = Args { input: job.input.clone(), output: Some(output), ..(**flags).clone() };
+                match job.kind {
+                    Kind::Mesh => vec![bake_gltf(&flags, &silent)?],
+                    _ => bake_folder(&flags, &silent)?,
+                }
+            }
+            Flags::Detail(flags) => {
+                let flags = SolveArgs { target: job.input.clone(), output, ..(**flags).clone() };
+                solve_target(&flags, &silent)?;
+                Vec::new()
+            }
         };
         let warnings: Vec<&str> =
             reports.iter().flat_map(|r: &Report| &r.warnings).map(String::as_str).collect();
         let entry = self.cache.publish(key, work, &job.name, serde_json::json!(warnings))?;
-        if !self.place(job, key, &entry, report)? {
+        if self.place(job, key, &entry, report)?.is_none() {
             let reason = std::io::Error::other("its files vanished while they were copied out; try again");
             return Err(kinran_image::Error::io(self.cache.root(), reason).into());
         }
         Ok(Status::Baked)
     }
 
-    /// Copies an entry's files to the output, those that are not there yet; false where the cache has lost one.
-    fn place(&self, job: &Job, key: &Key, entry: &Entry, report: &mut EntryReport) -> Result<bool, Error> {
+    /// Copies an entry's files to the output, those that are not there yet, and tells how many those were; nothing
+    /// where the cache has lost one.
+    fn place(
+        &self,
+        job: &Job,
+        key: &Key,
+        entry: &Entry,
+        report: &mut EntryReport,
+    ) -> Result<Option<usize>, Error> {
         let folder = self.output.join(&job.folder);
         let scratch = WorkFolder::new(&self.output.join(STATE))?;
-        let mut files = Vec::new();
+        let (mut files, mut copied) = (Vec::new(), 0);
         for file in &entry.files {
-            let Some(name) = relative(&file.name) else { return Ok(false) };
+            let Some(name) = relative(&file.name) else { return Ok(None) };
             let path = folder.join(name);
             if !is_already(&path, file) {
-                let Some(bytes) = self.cache.read(key, file) else { return Ok(false) };
+                let Some(bytes) = self.cache.read(key, file) else { return Ok(None) };
                 refuse_input(job, &path)?;
                 if let Some(parent) = path.parent() {
                     std::fs::create_dir_all(parent).map_err(|e| kinran_image::Error::io(parent, e))?;
                 }
                 write_atomically_in(scratch.path(), &path, &bytes)?;
+                copied += 1;
             }
             if let Some(stamp) = Stamp::of(&path) {
                 files.push((file.clone(), stamp));
@@ -486,7 +511,7 @@ impl Library {
         if lock(&self.saved).elapsed() > SAVE_STEP {
             self.save()?;
         }
-        Ok(true)
+        Ok(Some(copied))
     }
 
     /// Saves what is known of inputs and output, so that the next run need not look at their bytes.
@@ -524,7 +549,7 @@ fn refuse_input(job: &Job, path: &Path) -> Result<(), Error> {
     let Ok(existing) = path.canonicalize() else { return Ok(()) };
     let beside = match job.kind {
         Kind::Aniso => Some(job.input.as_path()),
-        Kind::Mesh => job.input.parent(),
+        Kind::Mesh | Kind::Detail => job.input.parent(),
     };
     let home = beside.and_then(|folder| folder.canonicalize().ok());
     if home.is_some_and(|home| existing.parent() == Some(&home)) {

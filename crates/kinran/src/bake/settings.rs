@@ -1,24 +1,41 @@
-//! Flags of `kinran bake` as a manifest gives them.
+//! Flags of `kinran bake` and `kinran detail solve` as a manifest gives them.
 
 use clap::{ArgAction, CommandFactory, Parser};
-use kinran_bake::manifest::{Job, Manifest, ManifestError, Setting, SettingValue};
+use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError, Setting, SettingValue};
 
 use super::Args;
 use crate::Error;
+use crate::detail::SolveArgs;
 
 /// Flags that say what a run does, not how an entry is baked.
 const OF_THE_RUN: [&str; 6] = ["output", "watch", "jobs", "cache", "dry-run", "help"];
 
 #[derive(Parser)]
 #[command(name = "bake", no_binary_name = true)]
-struct Flags {
+struct BakeFlags {
     #[command(flatten)]
-    bake: Args,
+    args: Args,
+}
+
+#[derive(Parser)]
+#[command(name = "solve", no_binary_name = true)]
+struct DetailFlags {
+    #[command(flatten)]
+    args: SolveArgs,
+}
+
+/// How an entry is baked; input and output are not set.
+#[derive(Clone, Debug)]
+pub(super) enum Flags {
+    /// [`Kind::Aniso`] and [`Kind::Mesh`].
+    Bake(Box<Args>),
+    /// [`Kind::Detail`].
+    Detail(Box<SolveArgs>),
 }
 
 /// Refuses flags that a manifest sets for its entries.
 pub(super) fn refuse_others(args: &Args) -> Result<(), Error> {
-    let bare = Flags::try_parse_from(["kinran.toml"]).map_err(|e| Error::Internal(e.to_string()))?.bake;
+    let bare = BakeFlags::try_parse_from(["x"]).map_err(|e| Error::Internal(e.to_string()))?.args;
     let of_the_run = Args {
         input: args.input.clone(),
         output: args.output.clone(),
@@ -36,36 +53,77 @@ pub(super) fn refuse_others(args: &Args) -> Result<(), Error> {
     Ok(())
 }
 
-/// Refuses settings that no entry can have, entry by entry.
-pub(super) fn check(manifest: &Manifest) -> Result<(), ManifestError> {
-    manifest.settings().try_for_each(|setting| words(manifest, setting).map(drop))
-}
-
-/// The flags of a job; its input and output are not set.
-pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Args, ManifestError> {
-    let mut all = vec!["kinran.toml".to_owned()];
+/// The flags of a job.
+pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestError> {
+    let mut all = words_before(job.kind);
     for setting in &job.settings {
-        all.extend(words(manifest, setting)?);
+        all.extend(words(manifest, job.kind, setting)?);
     }
-    let mut flags = Flags::try_parse_from(all).map_err(|e| manifest.error(&job.place, reason(&e)))?.bake;
+    let wrong = |e: clap::Error| manifest.error(&job.place, reason(&e));
     // Files that are not in the entry's folder are beside the manifest, not where the program was started.
-    for path in flags.map.iter_mut().map(|(_, path)| path).chain(&mut flags.ignore) {
+    if job.kind == Kind::Detail {
+        let mut args = DetailFlags::try_parse_from(all).map_err(wrong)?.args;
+        for layer in &mut args.layer {
+            layer.tile = manifest.beside(&layer.tile);
+            layer.mask = layer.mask.as_ref().map(|mask| manifest.beside(mask));
+        }
+        return Ok(Flags::Detail(Box::new(args)));
+    }
+    let mut args = BakeFlags::try_parse_from(all).map_err(wrong)?.args;
+    for path in args.map.iter_mut().map(|(_, path)| path).chain(&mut args.ignore) {
         if !job.input.join(&path).exists() {
             *path = manifest.beside(&*path);
         }
     }
-    Ok(flags)
+    Ok(Flags::Bake(Box::new(args)))
+}
+
+fn command(kind: Kind) -> clap::Command {
+    match kind {
+        Kind::Aniso | Kind::Mesh => BakeFlags::command(),
+        Kind::Detail => DetailFlags::command(),
+    }
+}
+
+/// What a command cannot be without, and an entry says elsewhere.
+fn words_before(kind: Kind) -> Vec<String> {
+    let words: &[&str] = match kind {
+        Kind::Aniso | Kind::Mesh => &["input"],
+        Kind::Detail => &["input", "--output=output"],
+    };
+    words.iter().map(|&word| word.into()).collect()
+}
+
+/// Tries a flag by itself.
+fn try_word(kind: Kind, name: &str, word: &str) -> Result<(), clap::Error> {
+    let mut all = words_before(kind);
+    all.push(word.into());
+    match kind {
+        Kind::Aniso | Kind::Mesh => BakeFlags::try_parse_from(all).map(drop),
+        Kind::Detail => {
+            if name != "layer" {
+                all.push("--layer=x".into());
+            }
+            DetailFlags::try_parse_from(all).map(drop)
+        }
+    }
 }
 
 /// What a person would type for a setting.
-fn words(manifest: &Manifest, setting: &Setting) -> Result<Vec<String>, ManifestError> {
-    let command = Flags::command();
+fn words(manifest: &Manifest, kind: Kind, setting: &Setting) -> Result<Vec<String>, ManifestError> {
+    let command = command(kind);
     let name = &setting.name;
-    let argument = command
-        .get_arguments()
-        .find(|a| a.get_long() == Some(name))
-        .filter(|_| !OF_THE_RUN.contains(&name.as_str()))
-        .ok_or_else(|| manifest.error(&setting.place, unknown(&command, name)))?;
+    let find = |command: &clap::Command| {
+        let known = command.get_arguments().find(|a| a.get_long() == Some(name)).cloned();
+        known.filter(|_| !OF_THE_RUN.contains(&name.as_str()))
+    };
+    let Some(argument) = find(&command) else {
+        let other = if kind == Kind::Detail { Kind::Aniso } else { Kind::Detail };
+        if setting.is_default && find(&self::command(other)).is_some() {
+            return Ok(Vec::new());
+        }
+        return Err(manifest.error(&setting.place, unknown(&command, name)));
+    };
     let is_switch = matches!(argument.get_action(), ArgAction::SetTrue);
     match &setting.value {
         SettingValue::Switch(true) if is_switch => Ok(vec![format!("--{name}")]),
@@ -84,8 +142,8 @@ fn words(manifest: &Manifest, setting: &Setting) -> Result<Vec<String>, Manifest
             }
             let typed = |(value, place): &(String, _)| {
                 let word = format!("--{name}={value}");
-                match Flags::try_parse_from(["kinran.toml", &word]) {
-                    Ok(_) => Ok(word),
+                match try_word(kind, name, &word) {
+                    Ok(()) => Ok(word),
                     Err(e) => Err(manifest.error(place, reason(&e))),
                 }
             };
@@ -105,10 +163,7 @@ fn unknown(command: &clap::Command, name: &str) -> String {
         .filter(|long| !OF_THE_RUN.contains(long))
         .collect();
     names.sort_unstable();
-    format!(
-        "unknown key `{name}`; expected input, exclude, output, or a flag of `kinran bake`: {}",
-        names.join(", ")
-    )
+    format!("unknown key `{name}`; expected input, exclude, output, or a flag: {}", names.join(", "))
 }
 
 /// A flag error without the words that are about command lines.

@@ -28,7 +28,7 @@ use crate::{Console, Error};
 /// A layer is FILE,NAME=VALUE,...: scale (4 or 4x2), rotation (degrees), offset, mirror, hue (degrees), saturation and
 /// value (factors), mask, channel (r, g, b, a) and contrast of the mask, y-down. The first layer lies at the bottom;
 /// each of the others needs a mask. FILE is an image, or a tile that was baked before (.ktx2, .dds).
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran detail solve helmet_color.png --layer steel.png,scale=4 -o baked/
   kinran detail solve wall.png --layer brick.png,scale=6 --layer moss.png,scale=9,mask=masks.png,channel=g -o baked/
