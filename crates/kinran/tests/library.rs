@@ -387,8 +387,9 @@ fn a_target_is_solved_otherwise_than_by_hand() {
     let library = Library::new(1);
     let image = |name: &str, seed: u8| fs::write(library.path(name), normals(seed)).unwrap();
     fs::create_dir(library.path("tiles")).unwrap();
-    [("wall.png", 1), ("tiles/brick.png", 2), ("tiles/moss.png", 3), ("mask.png", 4)]
-        .map(|(n, s)| image(n, s));
+    for (name, seed) in [("wall.png", 1), ("tiles/brick.png", 2), ("tiles/moss.png", 3), ("mask.png", 4)] {
+        image(name, seed);
+    }
     library.describe(
         "[defaults]\npreset = \"fast\"\nfilter = \"linear\"\n[tile.brick]\nfile = \"tiles/brick.png\"\nscale = 2\n\
          rotation = 30\n[[detail]]\ninput = \"wall.png\"\noutput = \"walls\"\nformat = \"bc1\"\nlayer = [\n\

@@ -18,7 +18,7 @@ use crate::values::number;
 use crate::{Console, Error};
 
 /// Flags about skin and curvature.
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug, PartialEq, clap::Args)]
 #[command(next_help_heading = "Skin (glTF)")]
 pub struct CurvatureArgs {
     /// Marks a material as skin by its name, or "all"; may be given again
@@ -422,7 +422,7 @@ fn dump(
 ) -> Result<(), Error> {
     let stem = args.input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     let path =
-        |extension: &str| args.output.join(format!("{stem}_{}_curvature.{extension}", file_stem(name)));
+        |extension: &str| args.output().join(format!("{stem}_{}_curvature.{extension}", file_stem(name)));
     match format {
         DumpFormat::Exr => {
             let height = baked.tensors.len().div_ceil(DUMP_WIDTH);

@@ -42,12 +42,7 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
             args.input.display()
         )));
     }
-    let smoothed = curvature::with_normals(&args.input, &args.curvature)?;
-    let input =
-        smoothed.as_ref().map_or_else(|| args.input.clone(), |f| f.path().join(file_name(&args.input)));
-    let mut scene = Scene::load(&input)?;
-    let mut document = Document::open(&input)?;
-    curvature::mark_skin(&args.curvature, &mut scene, &mut document)?;
+    let (_files, scene, mut document) = read(args)?;
     let mut report = Report::new(args);
     let surfaces = surfaces(args, &scene, &document, &mut report);
     std::fs::create_dir_all(args.output()).map_err(|e| kinran_image::Error::io(args.output(), e))?;
@@ -67,6 +62,18 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
     report.warnings.extend(document.write(&output)?);
     report.write(&args.output().join(format!("{stem}.kinran.json")))?;
     Ok(report)
+}
+
+/// The model as it is baked: its skin marked, its normals estimated where that was asked for. The document reads the
+/// files of the folder that comes with it when it needs them.
+fn read(args: &Args) -> Result<(Option<tempfile::TempDir>, Scene, Document), Error> {
+    let smoothed = curvature::with_normals(&args.input, &args.curvature)?;
+    let input =
+        smoothed.as_ref().map_or_else(|| args.input.clone(), |f| f.path().join(file_name(&args.input)));
+    let mut scene = Scene::load(&input)?;
+    let mut document = Document::open(&input)?;
+    curvature::mark_skin(&args.curvature, &mut scene, &mut document)?;
+    Ok((smoothed, scene, document))
 }
 
 /// The surfaces of a document's materials; materials that share one share its textures.
@@ -92,7 +99,7 @@ fn surfaces(
             Err(NoSurface::Apart(reason)) => report.warnings.push(reason),
         }
     }
-    let skin = scene.primitives.iter().any(|p| args.curvature.wants(&scene, p));
+    let skin = scene.primitives.iter().any(|p| args.curvature.wants(scene, p));
     if surfaces.is_empty() && !args.all_textures && !skin {
         report.warnings.push(format!(
             "{}: no material has a normal or an anisotropy map; nothing but --all-textures would bake anything",
@@ -456,8 +463,7 @@ pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
         height: u32,
         anisotropic: bool,
     }
-    let scene = Scene::load(&args.input)?;
-    let document = Document::open(&args.input)?;
+    let (_files, scene, document) = read(args)?;
     let mut report = Report::new(args);
     let surfaces = surfaces(args, &scene, &document, &mut report);
     let rows: Vec<Row> = surfaces
