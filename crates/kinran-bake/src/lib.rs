@@ -6,6 +6,7 @@ mod channels;
 pub mod curvature;
 pub mod detail;
 pub mod folder;
+pub mod fuzz_fit;
 pub mod manifest;
 mod material;
 mod mips;

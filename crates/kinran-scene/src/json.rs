@@ -330,6 +330,35 @@ pub(crate) struct Anisotropy {
     pub(crate) anisotropy_texture: Option<TextureInfo>,
 }
 
+/// Units and ranges are in docs/schema/KINRAN_materials_fuzz.schema.json.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub(crate) struct Fuzz {
+    pub(crate) fuzziness: Option<f32>,
+    pub(crate) fuzziness_texture: Option<TextureInfo>,
+    pub(crate) phase: Option<String>,
+    pub(crate) density: Option<f32>,
+    pub(crate) density_texture: Option<TextureInfo>,
+    pub(crate) spread: Option<f32>,
+    pub(crate) fiber_color_factor: Option<[f32; 3]>,
+    pub(crate) fiber_color_texture: Option<TextureInfo>,
+    pub(crate) tilt: Option<f32>,
+    pub(crate) azimuth: Option<f32>,
+    pub(crate) direction_texture: Option<TextureInfo>,
+    pub(crate) normal_smoothness: Option<f32>,
+    pub(crate) attenuation: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+#[derive(Default)]
+pub(crate) struct Sheen {
+    pub(crate) sheen_color_factor: [f32; 3],
+    pub(crate) sheen_color_texture: Option<TextureInfo>,
+    pub(crate) sheen_roughness_factor: f32,
+    pub(crate) sheen_roughness_texture: Option<TextureInfo>,
+}
+
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct EmissiveStrength {

@@ -10,6 +10,7 @@ mod document;
 mod environment;
 mod error;
 mod frame;
+mod fuzz;
 mod json;
 mod load;
 mod scene;
@@ -19,6 +20,7 @@ mod tangent;
 pub use document::{Attribute, Document, Object, Slot, TextureExtension};
 pub use environment::Environment;
 pub use error::Error;
+pub use fuzz::{FUZZ_EXTENSION, Fuzz, FuzzAttenuation, FuzzLayer, FuzzPhase, SHEEN_MATCH};
 pub use scene::{
     AlphaMode, Anisotropy, Camera, Instance, Light, LightKind, Material, Primitive, Scene, Skin, SkinProfile,
     Source, TextureRef, VertexCurvature, Wrap,

@@ -12,14 +12,15 @@ use serde::Deserialize;
 use crate::accessor::Accessors;
 use crate::container::{Resolver, beside, fetch, read_regular_file, split};
 use crate::{
-    AlphaMode, Anisotropy, Camera, Error, Instance, Light, LightKind, Material, Primitive, Scene, Skin,
-    SkinProfile, Source, TextureRef, VertexCurvature, Wrap, json, tangent,
+    AlphaMode, Anisotropy, Camera, Error, FUZZ_EXTENSION, Fuzz, FuzzAttenuation, FuzzLayer, FuzzPhase,
+    Instance, Light, LightKind, Material, Primitive, Scene, Skin, SkinProfile, Source, TextureRef,
+    VertexCurvature, Wrap, json, tangent,
 };
 
 /// Extensions that may stand in `extensionsRequired`: those this module reads, and those that change how
 /// a surface looks but leave the rest of the document as it is; the latter are listed in
 /// [`Material::ignored_extensions`] or in [`Scene::warnings`].
-const ADMITTED_EXTENSIONS: [&str; 24] = [
+const ADMITTED_EXTENSIONS: [&str; 25] = [
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -40,6 +41,7 @@ const ADMITTED_EXTENSIONS: [&str; 24] = [
     "KHR_texture_basisu",
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
+    "KINRAN_materials_fuzz",
     "KINRAN_materials_skin",
     "KINRAN_mesh_curvature",
     "MSFT_texture_dds",
@@ -47,8 +49,13 @@ const ADMITTED_EXTENSIONS: [&str; 24] = [
 ];
 
 /// Material extensions that [`Material`] represents.
-const READ_MATERIAL_EXTENSIONS: [&str; 3] =
-    ["KHR_materials_anisotropy", "KHR_materials_emissive_strength", "KINRAN_materials_skin"];
+const READ_MATERIAL_EXTENSIONS: [&str; 5] = [
+    "KHR_materials_anisotropy",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_sheen",
+    "KINRAN_materials_fuzz",
+    "KINRAN_materials_skin",
+];
 
 /// Texture extensions whose image is taken when a texture has no core one.
 const TEXTURE_EXTENSIONS: [&str; 2] = ["KHR_texture_basisu", "MSFT_texture_dds"];
@@ -271,6 +278,7 @@ impl Loader<'_> {
             emissive: self.texture(&material.emissive_texture, &format!("{what}: emissiveTexture"))?,
             anisotropy,
             skin: self.skin(&material.extensions, &what)?,
+            fuzz: self.fuzz(material, &what)?,
             alpha_mode: match material.alpha_mode {
                 json::AlphaMode::Opaque => AlphaMode::Opaque,
                 json::AlphaMode::Mask => AlphaMode::Mask {
@@ -338,6 +346,94 @@ impl Loader<'_> {
             normal_blur: Vec3::new(self.unit(r, &blur)?, self.unit(g, &blur)?, self.unit(b, &blur)?),
             penumbra: penumbra.max(0.0),
         }))
+    }
+
+    /// Our own extension, else sheen.
+    fn fuzz(&mut self, material: &json::Material, what: &str) -> Result<Option<Fuzz>, Error> {
+        let Some(fuzz) = self.extension::<json::Fuzz>(&material.extensions, FUZZ_EXTENSION, what)? else {
+            return self.sheen(material, what);
+        };
+        let what = format!("{what}: {FUZZ_EXTENSION}");
+        if let Some(fuzziness) = fuzz.fuzziness {
+            let fuzziness = self.within(fuzziness, 0.0..=1.0, &what, "fuzziness")?;
+            let texture = self.texture(&fuzz.fuzziness_texture, &format!("{what}: fuzzinessTexture"))?;
+            return Ok(Some(Fuzz::Simple { fuzziness, texture }));
+        }
+        let default = FuzzLayer::default();
+        let right_angle = std::f32::consts::FRAC_PI_2;
+        let color = fuzz.fiber_color_factor.unwrap_or(default.color.to_array());
+        for component in color {
+            self.within(component, 0.0..=1.0, &what, "fiberColorFactor")?;
+        }
+        Ok(Some(Fuzz::Layer(FuzzLayer {
+            phase: self.named(&fuzz.phase, &FuzzPhase::NAMES, &what, "phase")?,
+            density: self.within(fuzz.density.unwrap_or(default.density), 0.0..=2.0, &what, "density")?,
+            density_texture: self.texture(&fuzz.density_texture, &format!("{what}: densityTexture"))?,
+            spread: self.within(fuzz.spread.unwrap_or(default.spread), 0.0..=1.0, &what, "spread")?,
+            color: color.into(),
+            color_texture: self.texture(&fuzz.fiber_color_texture, &format!("{what}: fiberColorTexture"))?,
+            // A right angle as decimals may round to a little more.
+            tilt: self
+                .within(fuzz.tilt.unwrap_or(default.tilt), 0.0..=right_angle + 1e-5, &what, "tilt")?
+                .min(right_angle),
+            azimuth: self.finite([fuzz.azimuth.unwrap_or(default.azimuth)], &format!("{what}: azimuth"))?[0],
+            direction_texture: self.texture(&fuzz.direction_texture, &format!("{what}: directionTexture"))?,
+            normal_smoothness: {
+                let smoothness = fuzz.normal_smoothness.unwrap_or(default.normal_smoothness);
+                self.within(smoothness, 0.0..=1.0, &what, "normalSmoothness")?
+            },
+            attenuation: self.named(&fuzz.attenuation, &FuzzAttenuation::NAMES, &what, "attenuation")?,
+        })))
+    }
+
+    /// `KHR_materials_sheen` as upright fibres; one without colour is none.
+    fn sheen(&mut self, material: &json::Material, what: &str) -> Result<Option<Fuzz>, Error> {
+        let Some(sheen) = self.extension::<json::Sheen>(&material.extensions, "KHR_materials_sheen", what)?
+        else {
+            return Ok(None);
+        };
+        let color = Vec3::from(self.finite(sheen.sheen_color_factor, &format!("{what}: sheenColorFactor"))?);
+        if color.max_element() <= 0.0 {
+            return Ok(None);
+        }
+        let roughness = self.unit(sheen.sheen_roughness_factor, &format!("{what}: sheenRoughnessFactor"))?;
+        if sheen.sheen_roughness_texture.is_some() {
+            self.warn(format!("{what}: sheenRoughnessTexture is left out; its factor is taken everywhere"));
+        }
+        let color_texture =
+            self.texture(&sheen.sheen_color_texture, &format!("{what}: sheenColorTexture"))?;
+        let layer = FuzzLayer::from_sheen(color.clamp(Vec3::ZERO, Vec3::ONE), roughness);
+        Ok(Some(Fuzz::Layer(FuzzLayer { color_texture, ..layer })))
+    }
+
+    /// A number of ours, which is refused where it is out of range: there is no telling what was meant.
+    fn within(
+        &self,
+        value: f32,
+        range: std::ops::RangeInclusive<f32>,
+        what: &str,
+        field: &str,
+    ) -> Result<f32, Error> {
+        if range.contains(&value) {
+            return Ok(value);
+        }
+        let (low, high) = (range.start(), range.end());
+        Err(self.error(format!("{what}: {field} is {value}; it must be {low} to {high}")))
+    }
+
+    /// What a name in a file stands for, the first where there is none.
+    fn named<T: Copy>(
+        &self,
+        name: &Option<String>,
+        names: &[(&'static str, T)],
+        what: &str,
+        field: &str,
+    ) -> Result<T, Error> {
+        let Some(name) = name else { return Ok(names[0].1) };
+        names.iter().find(|(known, _)| known == name).map(|(_, value)| *value).ok_or_else(|| {
+            let known: Vec<&str> = names.iter().map(|(known, _)| *known).collect();
+            self.error(format!("{what}: {field} is {name:?}; it must be one of {}", known.join(", ")))
+        })
     }
 
     fn extension<'de, T: Deserialize<'de>>(

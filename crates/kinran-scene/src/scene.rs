@@ -2,6 +2,8 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
 
+use crate::Fuzz;
+
 /// How a texture repeats outside the unit square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Wrap {
@@ -148,6 +150,8 @@ pub struct Material {
     pub anisotropy: Option<Anisotropy>,
     /// `KINRAN_materials_skin`, when present.
     pub skin: Option<Skin>,
+    /// `KINRAN_materials_fuzz`, or `KHR_materials_sheen` as upright fibres.
+    pub fuzz: Option<Fuzz>,
     /// Transparency.
     pub alpha_mode: AlphaMode,
     /// Both sides are lit; otherwise back faces are culled.
@@ -170,6 +174,7 @@ impl Material {
         ]
         .into_iter()
         .flatten()
+        .chain(self.fuzz.iter().flat_map(Fuzz::textures))
     }
 }
 

@@ -63,7 +63,7 @@ fn everything() -> (Value, Vec<u8>) {
             "extensions": {
                 "KHR_materials_anisotropy": { "anisotropyStrength": 0.6, "anisotropyRotation": 1.57, "anisotropyTexture": { "index": 0 } },
                 "KHR_materials_emissive_strength": { "emissiveStrength": 4 },
-                "KHR_materials_sheen": {},
+                "KHR_materials_clearcoat": {},
             },
         }],
         "textures": [{ "source": 0, "sampler": 0 }],
@@ -158,7 +158,7 @@ fn everything_arrives_where_it_belongs() {
     assert_eq!(normal.wrap, [Wrap::Clamp, Wrap::Mirror]);
     assert_eq!(material.alpha_mode, AlphaMode::Mask { cutoff: 0.5 });
     assert_eq!(material.emissive_factor, Vec3::new(2., 0., 0.));
-    assert_eq!(material.ignored_extensions, ["KHR_materials_sheen"]);
+    assert_eq!(material.ignored_extensions, ["KHR_materials_clearcoat"]);
     let anisotropy = material.anisotropy.as_ref().unwrap();
     assert_eq!((anisotropy.strength, anisotropy.rotation), (0.6, 1.57));
     assert!(anisotropy.texture.is_some());

@@ -571,6 +571,9 @@ float3 fuzz_smooth_normal(float3 n, float3 vertex_normal, float smoothness)
 #define KINRAN_FUZZ_AMBIENT_HLSL
 
 
+/// Nodes of the ambient table along each of its sides, the first and the last at the ends of their ranges.
+static const uint FUZZ_TABLE_SIZE = 64u;
+
 /// Mean over the hemisphere of the layer's BRDF times cosine over phase (slide: Ambient Lighting, `G~`), for a view at
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
 /// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002.
@@ -623,14 +626,15 @@ float fuzz_ambient_factor(float coefficients[8], float n_v, float t_v)
     return max(((coefficients[0] + across) + along), 0.0);
 }
 
-/// Where the table that replaces `fuzz_ambient_factor` for combed fibres is read, each in [0, 1]: x is `n_v`, y runs
-/// with the cosine of the azimuth between view and fibre. `t_n` is `t·n`.
+/// Texture coordinates in the table that replaces `fuzz_ambient_factor` for combed fibres, of FUZZ_TABLE_SIZE texels a
+/// side: x runs with `n_v` from 0 to 1, y with the cosine of the azimuth between view and fibre. `t_n` is `t·n`.
 ///
-/// Cost on GCN: 7 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 11 instructions (1 at a quarter of the rate).
 float2 fuzz_ambient_place(float n_v, float t_v, float t_n)
 {
     float sines = sqrt(max(((1.0 - (n_v * n_v)) * (1.0 - (t_n * t_n))), 1e-12));
-    return float2(n_v, saturate((0.5 + ((0.5 * (t_v - (n_v * t_n))) / sines))));
+    float azimuth = saturate((0.5 + ((0.5 * (t_v - (n_v * t_n))) / sines)));
+    return (float2(n_v, azimuth) * (1.0 - 0.015625)) + ((0.5 * 0.015625)).xx;
 }
 
 /// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a

@@ -5,7 +5,7 @@ mod brushed_disc;
 mod glb;
 mod maps;
 mod mesh;
-mod noise;
+pub(crate) mod noise;
 mod page;
 mod scenes;
 mod twill;

@@ -11,6 +11,8 @@ mod console;
 pub mod demo;
 pub mod detail;
 mod error;
+pub mod fit;
+pub mod fuzz_sheet;
 pub mod inspect;
 mod outputs;
 pub mod picture;

@@ -5,7 +5,9 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 #[cfg(feature = "view")]
 use kinran::viewer;
-use kinran::{Console, Error, bake, cache, compare, demo, detail, inspect, render, shaders, skin_lut};
+use kinran::{
+    Console, Error, bake, cache, compare, demo, detail, fit, fuzz_sheet, inspect, render, shaders, skin_lut,
+};
 
 /// Anisotropic materials from authored maps to pictures.
 #[derive(Parser)]
@@ -17,6 +19,7 @@ use kinran::{Console, Error, bake, cache, compare, demo, detail, inspect, render
   kinran compare model.glb -o comparison/
   kinran detail solve helmet.png --layer steel.png,scale=4 -o baked/
   kinran inspect model_normal.ktx2
+  kinran fit fuzz --tilt 30 --spread 0.2
   kinran shaders --lang hlsl -o shaders/
 
 Angles are degrees. `kinran help COMMAND` tells all about a command.
@@ -47,6 +50,8 @@ enum Command {
     Compare(compare::Args),
     Detail(detail::Args),
     Inspect(inspect::Args),
+    Fit(fit::Args),
+    Fuzz(Box<fuzz_sheet::Args>),
     Shaders(shaders::Args),
     SkinLut(skin_lut::Args),
     #[cfg(feature = "view")]
@@ -74,6 +79,8 @@ fn run(command: &Command, console: &Console) -> Result<(), Error> {
         Command::Compare(args) => compare::run(args, console),
         Command::Detail(args) => detail::run(args, console),
         Command::Inspect(args) => inspect::run(args, console),
+        Command::Fit(args) => fit::run(args, console),
+        Command::Fuzz(args) => fuzz_sheet::run(args, console),
         #[cfg(feature = "view")]
         Command::View(args) => viewer::run(args, console),
         Command::Shaders(args) => shaders::run(args, console),

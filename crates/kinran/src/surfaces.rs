@@ -6,10 +6,11 @@ use kinran_bake::aniso::{
     Filter, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps, SurfaceOptions, TexelSpan,
     bake_surface,
 };
+use kinran_bake::fuzz_fit::{Phase, fuzz_fit};
 use kinran_bake::{NoSurface, material_surface};
 use kinran_image::{Role, full_level_count, level_size};
-use kinran_render::reference::{BoundTexture, MipLevel, MipTexture, SurfaceTextures};
-use kinran_scene::{Material, Scene, TextureRef};
+use kinran_render::reference::{BoundTexture, FuzzCoefficients, MipLevel, MipTexture, SurfaceTextures};
+use kinran_scene::{FuzzPhase, Material, Scene, TextureRef};
 
 use crate::{Error, Progress};
 
@@ -158,4 +159,20 @@ fn separate_surface(
         )?,
         aniso: bound(Sheet::Aniso, anisotropy_place.or(roughness_place), NormalMap::flat(), roughness)?,
     })
+}
+
+/// Coefficients of a layer of fibres at `tilt` radians from the normal, for
+/// [`RenderScene::fit_fuzz`](kinran_render::reference::RenderScene::fit_fuzz).
+pub fn fuzz_coefficients(phase: FuzzPhase, tilt: f32, spread: f32) -> FuzzCoefficients {
+    let phase = match phase {
+        FuzzPhase::Fibre => Phase::Fibre,
+        FuzzPhase::Velvet => Phase::Velvet,
+    };
+    let fit = fuzz_fit(phase, tilt.into(), spread.into());
+    FuzzCoefficients {
+        p_s: fit.p_s.coefficients,
+        ambient: fit.ambient.coefficients,
+        direction: fit.direction.coefficients,
+        r: fit.r.coefficients[0],
+    }
 }

@@ -38,6 +38,7 @@ fn light(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
 
     let view = normalize(frame.camera.xyz - surface.position);
     let lobe = lobe_of(surface, view);
+    surface.fuzz = fuzz_simple(fuzziness_from_code(base.a * 255.0), surface.normal, view, lobe.diffuse);
     var sum = ambient(surface, lobe, 1u);
     for (var i = 0u; i < frame.counts.x; i++) {
         let light = frame.lights[i];
@@ -47,14 +48,16 @@ fn light(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
             dot(surface.bitangent, incoming.direction),
             dot(surface.normal, incoming.direction),
         );
-        if u.z <= 0.0 {
+        if u.z <= -FUZZ_WRAP || (u.z <= 0.0 && surface.fuzz.kind == FUZZ_NONE) {
             continue;
         }
         var visible = 1.0;
         if light.color.w > 0.5 {
             visible = shadow(surface, incoming.direction);
         }
-        sum += (lobe.diffuse / PI + specular_isotropic(surface, lobe, u)) * incoming.irradiance * (u.z * visible);
+        let reflected = (lobe.diffuse / PI + specular_isotropic(surface, lobe, u)) * u.z;
+        let lit = select(vec3f(0.0), reflected, u.z > 0.0);
+        sum += fuzz_over(surface.fuzz, incoming.direction, lit, lobe.diffuse) * incoming.irradiance * visible;
     }
     return vec4f(sum, 1.0);
 }

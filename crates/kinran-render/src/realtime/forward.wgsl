@@ -10,15 +10,16 @@ fn lit(surface: Surface, lobe: Lobe) -> vec3f {
             dot(surface.bitangent, incoming.direction),
             dot(surface.normal, incoming.direction),
         );
-        if u.z <= 0.0 {
+        if u.z <= 0.0 && surface.fuzz.kind == FUZZ_NONE {
             continue;
         }
         var visible = 1.0;
         if light.color.w > 0.5 {
             visible = shadow(surface, incoming.direction);
         }
-        let reflected = lobe.diffuse / PI + specular_anisotropic(surface, lobe, u);
-        sum += reflected * incoming.irradiance * (u.z * visible);
+        let base = (lobe.diffuse / PI + specular_anisotropic(surface, lobe, u)) * u.z;
+        let lit = select(vec3f(0.0), base, u.z > 0.0);
+        sum += fuzz_over(surface.fuzz, incoming.direction, lit, lobe.diffuse) * incoming.irradiance * visible;
     }
     return sum;
 }

@@ -19,8 +19,9 @@ fn fill(in: Varying, @builtin(front_facing) front: bool) -> GBuffer {
         discard;
     }
     let roughness = sqrt(sqrt(surface.alpha_t * surface.alpha_b));
+    let fuzziness = select(0.0, surface.fuzz.amount, surface.fuzz.kind == FUZZ_SIMPLE);
     return GBuffer(
-        vec4f(surface.base_color, 0.0),
+        vec4f(surface.base_color, fuzziness_code(fuzziness, 0.0) / 255.0),
         octahedral_encode(surface.normal),
         vec4f(roughness, surface.metallic, surface.occlusion, 0.0),
         vec4f(surface.emitted, 1.0),

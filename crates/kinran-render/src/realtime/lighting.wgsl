@@ -21,6 +21,7 @@ struct Surface {
     occlusion: f32,
     emitted: vec3f,
     opacity: f32,
+    fuzz: Fuzz,
 }
 
 // What follows from a surface for one view.
@@ -157,5 +158,5 @@ fn ambient(surface: Surface, lobe: Lobe, taps: u32) -> vec3f {
         weights += weight;
     }
     let specular = sum / max(weights, 1e-6) * lobe.albedo;
-    return surface.occlusion * (diffuse + specular);
+    return surface.occlusion * fuzz_over_ambient(surface.fuzz, diffuse, specular, coefficients);
 }

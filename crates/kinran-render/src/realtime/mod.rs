@@ -6,6 +6,7 @@
 //! probe instead of samples of the environment) and shadows (a map of one directional light instead of rays).
 
 mod device;
+mod fuzz;
 mod probe;
 mod shaders;
 mod target;
@@ -526,6 +527,9 @@ impl Layouts {
         let mut material = vec![uniform];
         material.extend([filtered; 6]);
         material.extend([smooth; 6]);
+        material.push(uniform);
+        material.extend([filtered; 3]);
+        material.extend([smooth; 3]);
         Layouts {
             frame: layout(&[
                 uniform,
@@ -569,9 +573,25 @@ impl Pipelines {
         shown: wgpu::TextureFormat,
     ) -> Result<Self, Error> {
         use wgpu::CompareFunction::{Less, LessEqual};
-        let mesh = ["frame.wgsl", "lighting.wgsl", "surface.wgsl", "channels.wgsl", "forward.wgsl"];
-        let fill = ["frame.wgsl", "lighting.wgsl", "surface.wgsl", "octahedral.wgsl", "gbuffer.wgsl"];
-        let light_files = ["frame.wgsl", "lighting.wgsl", "octahedral.wgsl", "deferred.wgsl"];
+        let mesh = [
+            "frame.wgsl",
+            "fuzz.wgsl",
+            "lighting.wgsl",
+            "surface.wgsl",
+            "fuzz_surface.wgsl",
+            "channels.wgsl",
+            "forward.wgsl",
+        ];
+        let fill = [
+            "frame.wgsl",
+            "fuzz.wgsl",
+            "lighting.wgsl",
+            "surface.wgsl",
+            "fuzz_surface.wgsl",
+            "octahedral.wgsl",
+            "gbuffer.wgsl",
+        ];
+        let light_files = ["frame.wgsl", "fuzz.wgsl", "lighting.wgsl", "octahedral.wgsl", "deferred.wgsl"];
         let material = [&layouts.frame, &layouts.material];
         let everywhere = Pass {
             files: &[],

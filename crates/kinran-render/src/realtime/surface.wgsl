@@ -115,5 +115,6 @@ fn surface_at(in: Varying, front: bool) -> Surface {
     if material.flags.y == 1u && base.a < material.factors.z {
         surface.opacity = 0.0;
     }
+    surface.fuzz = fuzz_at(in, surface, to_world * side, view);
     return surface;
 }

@@ -9,7 +9,7 @@ use kinran_image::{Format, Texture, Transfer};
 use kinran_scene::{AlphaMode, Light, Wrap};
 use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
 
-use super::{Gpu, Layouts, probe};
+use super::{Gpu, Layouts, fuzz, probe};
 use crate::reference::{BoundTexture, MipTexture, RenderMaterial, RenderScene, Surroundings};
 
 /// Floats of a vertex: position, normal, tangent, both UV sets, colour.
@@ -33,6 +33,7 @@ pub(super) struct Draw {
 
 pub(super) struct Material {
     uniform: wgpu::Buffer,
+    fuzz: wgpu::Buffer,
     pub(super) bind_group: wgpu::BindGroup,
     pub(super) path: Path,
     pub(super) double_sided: bool,
@@ -94,6 +95,7 @@ impl GpuScene {
     ) {
         let floats = material_floats(material, adjustment);
         gpu.queue.write_buffer(&self.materials[index].uniform, 0, &bytes(&floats));
+        gpu.queue.write_buffer(&self.materials[index].fuzz, 0, &bytes(&fuzz::floats(material)));
     }
 
     pub(super) fn new(gpu: &Gpu, layouts: &Layouts, scene: &RenderScene, light: &GpuLight) -> Self {
@@ -316,12 +318,15 @@ fn material_floats(m: &RenderMaterial, adjustment: Adjustment) -> Vec<f32> {
 fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> Material {
     let white = BoundTexture::constant([1.0; 4]);
     let slots = slots(m, &white);
-    let floats = material_floats(m, Adjustment::default());
-    let uniform = textures.gpu.device.create_buffer_init(&BufferInitDescriptor {
-        label: None,
-        contents: &bytes(&floats),
-        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-    });
+    let buffer = |floats: &[f32]| {
+        textures.gpu.device.create_buffer_init(&BufferInitDescriptor {
+            label: None,
+            contents: &bytes(floats),
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        })
+    };
+    let uniform = buffer(&material_floats(m, Adjustment::default()));
+    let fuzz = buffer(&fuzz::floats(m));
 
     let views = slots.map(|slot| textures.view(&slot.texture));
     let samplers = slots.map(|slot| textures.sampler(slot.texture.wrap));
@@ -331,6 +336,15 @@ fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> M
     for (i, resource) in resources.enumerate() {
         entries.push(wgpu::BindGroupEntry { binding: i as u32 + 1, resource });
     }
+    let fuzz_slots = fuzz::slots(m, &white);
+    let fuzz_views = fuzz_slots.map(|slot| textures.view(&slot.texture));
+    let fuzz_samplers = fuzz_slots.map(|slot| textures.sampler(slot.texture.wrap));
+    let resources = std::iter::once(fuzz.as_entire_binding())
+        .chain(fuzz_views.iter().map(wgpu::BindingResource::TextureView))
+        .chain(fuzz_samplers.iter().map(wgpu::BindingResource::Sampler));
+    for resource in resources {
+        entries.push(wgpu::BindGroupEntry { binding: entries.len() as u32, resource });
+    }
     let bind_group = textures.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
         layout: &layouts.material,
@@ -338,10 +352,10 @@ fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> M
     });
     let path = if m.alpha_mode == AlphaMode::Blend || m.transmissive {
         Path::Blended
-    } else if m.surface.is_some() {
+    } else if m.surface.is_some() || fuzz::is_forward(m) {
         Path::Forward
     } else {
         Path::Deferred
     };
-    Material { uniform, bind_group, path, double_sided: m.double_sided }
+    Material { uniform, fuzz, bind_group, path, double_sided: m.double_sided }
 }

@@ -8,6 +8,7 @@
 pub(crate) mod albedo;
 mod bvh;
 mod camera;
+mod fuzz;
 mod geometry;
 mod light;
 mod render;
@@ -19,6 +20,7 @@ mod texture;
 
 pub use bvh::{Bvh, Hit};
 pub use camera::{CameraRay, PictureCamera, frame_box, look_at};
+pub use fuzz::{FUZZ_TILTS, FuzzCoefficients, RenderFuzz};
 pub use geometry::{Geometry, MAX_TRIANGLES, SurfacePoint};
 pub use render::{Background, Film, Settings, TextureFiltering, render};
 pub use scene::{BoundTexture, RenderMaterial, RenderScene, SurfaceTextures, Surroundings};

@@ -1,8 +1,9 @@
 //! The picture.
 
 use super::{
-    Hit, PictureCamera, RenderScene,
+    Hit, PictureCamera, RenderFuzz, RenderScene,
     camera::CameraRay,
+    fuzz::FuzzAt,
     geometry::SurfacePoint,
     light::incident,
     sampler::{pixel_seed, sample_2d},
@@ -12,6 +13,7 @@ use super::{
 use crate::Error;
 use glam::{Vec2, Vec3};
 use kinran_scene::{AlphaMode, Camera};
+use kinran_shading::fuzz::{fuzz_over_base_pdf, fuzz_over_base_sample};
 use kinran_shading::{ggx_vndf_pdf, ggx_vndf_sample};
 use rayon::prelude::*;
 use std::f32::consts::{FRAC_1_PI, TAU};
@@ -116,6 +118,7 @@ pub fn render(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Film, Error> {
     check(camera, settings)?;
+    check_fuzz(scene)?;
     let (width, height) = (settings.width, settings.height);
     let picture = PictureCamera::new(camera, width, height);
     let renderer = Renderer { scene, settings, cutouts: scene.materials.iter().any(lets_light_through) };
@@ -184,6 +187,14 @@ fn check(camera: &Camera, settings: &Settings) -> Result<(), Error> {
         return refuse("camera", camera.transform.to_string(), "it must be finite");
     }
     Ok(())
+}
+
+fn check_fuzz(scene: &RenderScene) -> Result<(), Error> {
+    let is_fitted = |fuzz: &RenderFuzz| fuzz.is_exact() || fuzz.coefficients.is_some();
+    match scene.materials.iter().position(|m| m.fuzz.as_ref().is_some_and(|fuzz| !is_fitted(fuzz))) {
+        Some(i) => Err(Error::Scene(format!("the fuzz of material {i} has no coefficients; call fit_fuzz"))),
+        None => Ok(()),
+    }
 }
 
 fn lets_light_through(material: &RenderMaterial) -> bool {
@@ -285,6 +296,10 @@ impl Renderer<'_> {
             }
         }
         if let Some(surroundings) = &self.scene.surroundings {
+            if let Some(fuzz) = &shading.fuzz {
+                return sum
+                    + shading.occlusion * self.environment_through(shading, fuzz, surroundings, sample);
+            }
             let n = shading.frame.z_axis;
             let irradiance = match (shading.skin, &self.scene.materials[point.material].skin) {
                 (Some(at), Some(skin)) => {
@@ -328,6 +343,39 @@ impl Renderer<'_> {
             sum += contribution(to_shading * world, world, pdf);
         }
         if count == 0 { Vec3::ZERO } else { sum / count as f32 }
+    }
+
+    /// The environment in all lobes of a layer of fibres and its base, none of them by harmonics, since the layer dims each
+    /// direction differently; sampled as [`Self::environment_specular`] is, once at least.
+    fn environment_through(
+        &self,
+        shading: &Shading,
+        fuzz: &FuzzAt,
+        surroundings: &Surroundings,
+        sample: Sample,
+    ) -> Vec3 {
+        let count = self.settings.env_samples.max(1);
+        let environment = &surroundings.environment;
+        let to_shading = shading.frame.transpose();
+        let (specular, diffuse) = shading.brightness();
+        let shares = fuzz.shares(specular, diffuse);
+        let (t, alpha) = fuzz.fibres();
+        let Shading { v, alpha_t, alpha_b, .. } = *shading;
+        let contribution = |u: Vec3, world: Vec3, environment_pdf: f32| -> Vec3 {
+            let lobe_pdf = fuzz_over_base_pdf(u, v, t, alpha, alpha_t, alpha_b, shares);
+            shading.reflected(u) * environment.radiance(world) / (lobe_pdf + environment_pdf)
+        };
+        let mut sum = Vec3::ZERO;
+        for i in sample.index * count..(sample.index + 1) * count {
+            let xi = sample_2d(i, LOBE, sample.seed);
+            let u = fuzz_over_base_sample(v, t, alpha, alpha_t, alpha_b, shares, xi);
+            let world = shading.frame * u;
+            sum += contribution(u, world, environment.pdf(world));
+
+            let (world, pdf) = environment.sample(sample_2d(i, ENVIRONMENT, sample.seed));
+            sum += contribution(to_shading * world, world, pdf);
+        }
+        sum / count as f32
     }
 
     /// The share of a light that reaches a point.

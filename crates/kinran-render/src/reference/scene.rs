@@ -1,10 +1,10 @@
 //! A scene as the renderer needs it.
 
-use super::{Geometry, MipTexture, RenderSkin};
+use super::{FUZZ_TILTS, FuzzCoefficients, Geometry, MipTexture, RenderFuzz, RenderSkin};
 use crate::Error;
 use glam::{Mat3, Vec2, Vec3, Vec4};
 use kinran_image::Transfer;
-use kinran_scene::{AlphaMode, Environment, Light, Material, Scene, TextureRef};
+use kinran_scene::{AlphaMode, Environment, Fuzz, FuzzPhase, Light, Material, Scene, TextureRef};
 use kinran_shading::sh::{Sh9, sh_convolve_cosine, sh_evaluate};
 use kinran_shading::skin::lighting::skin_irradiance;
 use std::{collections::HashMap, sync::Arc};
@@ -62,6 +62,8 @@ pub struct RenderMaterial {
     pub double_sided: bool,
     /// Light that is not reflected passes through unbent, tinted by the base colour: thin clear glass.
     pub transmissive: bool,
+    /// Fibres over all that.
+    pub fuzz: Option<RenderFuzz>,
 }
 
 /// Light from all around and its order-2 irradiance.
@@ -136,6 +138,17 @@ impl RenderScene {
             surroundings: environment.map(|e| Arc::new(Surroundings::new(e))),
         })
     }
+
+    /// Gives every layer of fibres coefficients that `fit` makes for its phase, tilts in radians and its spread.
+    pub fn fit_fuzz(&mut self, fit: impl Fn(FuzzPhase, f32, f32) -> FuzzCoefficients) {
+        for fuzz in self.materials.iter_mut().filter_map(|m| m.fuzz.as_mut()) {
+            if let Fuzz::Layer(layer) = &fuzz.fuzz {
+                let tilt = |i: usize| std::f32::consts::FRAC_PI_2 * i as f32 / (FUZZ_TILTS - 1) as f32;
+                let of_tilt = |i| fit(layer.phase, tilt(i), layer.spread);
+                fuzz.coefficients = Some(Box::new(std::array::from_fn(of_tilt)));
+            }
+        }
+    }
 }
 
 impl BoundTexture {
@@ -198,6 +211,23 @@ impl TextureLoader<'_> {
             skin: None,
             alpha_mode: m.alpha_mode,
             double_sided: m.double_sided,
+            fuzz: match &m.fuzz {
+                None => None,
+                Some(fuzz) => {
+                    let (direction, color, amount) = match fuzz {
+                        Fuzz::Layer(l) => (&l.direction_texture, &l.color_texture, &l.density_texture),
+                        Fuzz::Simple { texture, .. } => (&None, &None, texture),
+                    };
+                    Some(RenderFuzz {
+                        fuzz: fuzz.clone(),
+                        direction: load(direction, Transfer::Linear)?,
+                        color: load(color, Transfer::Srgb)?,
+                        amount: load(amount, Transfer::Linear)?,
+                        coefficients: None,
+                        talk_ambient: false,
+                    })
+                }
+            },
             transmissive: m.ignored_extensions.iter().any(|e| e == "KHR_materials_transmission"),
         })
     }

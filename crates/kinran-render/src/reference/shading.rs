@@ -6,6 +6,7 @@
 
 use super::{
     albedo::specular_albedo,
+    fuzz::FuzzAt,
     geometry::SurfacePoint,
     render::TextureFiltering,
     scene::{BoundTexture, RenderMaterial},
@@ -23,7 +24,7 @@ use std::f32::consts::FRAC_1_PI;
 const DIELECTRIC_F0: f32 = 0.04;
 
 /// Smallest cosine between shading normal and view; chosen by eye, below it grazing lobes only alias.
-const N_V_MIN: f32 = 1e-3;
+pub(crate) const N_V_MIN: f32 = 1e-3;
 
 /// A material evaluated for one point and one view.
 #[derive(Clone, Copy, Debug)]
@@ -47,16 +48,22 @@ pub(crate) struct Shading {
     pub(crate) opacity: f32,
     /// Where the material is skin, seen from its front.
     pub(crate) skin: Option<SkinPoint>,
+    /// Fibres over all that.
+    pub(crate) fuzz: Option<FuzzAt>,
 }
 
 /// A texture at a point as `filtering` says; white where there is none.
 #[inline]
-fn sample(texture: &Option<BoundTexture>, point: &SurfacePoint, filtering: TextureFiltering) -> Vec4 {
+pub(crate) fn sample(
+    texture: &Option<BoundTexture>,
+    point: &SurfacePoint,
+    filtering: TextureFiltering,
+) -> Vec4 {
     texture.as_ref().map_or(Vec4::ONE, |t| sample_bound(t, point, filtering))
 }
 
 #[inline]
-fn sample_bound(t: &BoundTexture, point: &SurfacePoint, filtering: TextureFiltering) -> Vec4 {
+pub(crate) fn sample_bound(t: &BoundTexture, point: &SurfacePoint, filtering: TextureFiltering) -> Vec4 {
     let uv = t.uv(point.uv);
     match filtering {
         TextureFiltering::Level0 => t.texture.sample_level(uv, 0),
@@ -140,6 +147,9 @@ impl Shading {
         let f0 = Vec3::splat(DIELECTRIC_F0).lerp(base.xyz(), metallic);
         let inside = 1.0 - specular_albedo(DIELECTRIC_F0, v.z, alpha_t, alpha_b);
         let passed = base.xyz() * (1.0 - metallic) * inside;
+        let diffuse = if material.transmissive { Vec3::ZERO } else { passed };
+        let fuzz = (material.fuzz.as_ref())
+            .and_then(|fuzz| FuzzAt::new(fuzz, point, filtering, to_world, frame, v, diffuse));
         let occlusion = sample(&material.occlusion, point, filtering).x;
         Shading {
             frame,
@@ -148,7 +158,7 @@ impl Shading {
             alpha_b,
             f0,
             compensation: multiscatter_compensation(f0, v.z, alpha_t, alpha_b),
-            diffuse: if material.transmissive { Vec3::ZERO } else { passed },
+            diffuse,
             transmitted: if material.transmissive { passed } else { Vec3::ZERO },
             occlusion: 1.0 + material.occlusion_strength * (occlusion - 1.0),
             emitted: material.emissive_factor * sample(&material.emissive, point, filtering).xyz(),
@@ -158,6 +168,7 @@ impl Shading {
                 .as_ref()
                 .filter(|_| front > 0.0)
                 .map(|skin| skin.at(point, normal, curvature_range)),
+            fuzz,
         }
     }
 
@@ -181,7 +192,14 @@ impl Shading {
     /// All of the BRDF for a light along `u` in the shading frame, per steradian, times the cosine.
     #[inline]
     pub(crate) fn reflected(&self, u: Vec3) -> Vec3 {
-        (self.diffuse * FRAC_1_PI + self.specular(u)) * u.z.max(0.0)
+        let base = (self.diffuse * FRAC_1_PI + self.specular(u)) * u.z.max(0.0);
+        self.fuzz.as_ref().map_or(base, |fuzz| fuzz.over(u, base))
+    }
+
+    /// How bright the specular and the diffuse lobe of the base are, roughly, for sampling.
+    pub(crate) fn brightness(&self) -> (f32, f32) {
+        let specular = specular_albedo(self.f0.max_element(), self.v.z, self.alpha_t, self.alpha_b);
+        (specular, self.diffuse.max_element())
     }
 }
 

@@ -51,11 +51,17 @@ pub fn fuzz_ambient_factor(coefficients: [f32; 8], n_v: f32, t_v: f32) -> f32 {
     (c0 + n_v * (c1 + c3 * n_v + c4 * t_v) + along).max(0.0)
 }
 
-/// Where the table that replaces [`fuzz_ambient_factor`] for combed fibres is read, each in [0, 1]: x is
-/// `n_v`, y runs with the cosine of the azimuth between view and fibre. `t_n` is `t·n`.
+/// Nodes of the ambient table along each of its sides, the first and the last at the ends of their ranges.
+pub const FUZZ_TABLE_SIZE: u32 = 64;
+
+/// Texture coordinates in the table that replaces [`fuzz_ambient_factor`] for combed fibres, of [`FUZZ_TABLE_SIZE`]
+/// texels a side: x runs with `n_v` from 0 to 1, y with the cosine of the azimuth between view and fibre. `t_n` is
+/// `t·n`.
 pub fn fuzz_ambient_place(n_v: f32, t_v: f32, t_n: f32) -> Vec2 {
+    const TEXEL: f32 = 1.0 / FUZZ_TABLE_SIZE as f32;
     let sines = sqrt(((1.0 - n_v * n_v) * (1.0 - t_n * t_n)).max(1e-12));
-    vec2(n_v, (0.5 + 0.5 * (t_v - n_v * t_n) / sines).clamp(0.0, 1.0))
+    let azimuth = (0.5 + 0.5 * (t_v - n_v * t_n) / sines).clamp(0.0, 1.0);
+    vec2(n_v, azimuth) * (1.0 - TEXEL) + 0.5 * TEXEL
 }
 
 /// The factor from what the table holds at [`fuzz_ambient_place`], interpolated bilinearly: x for a thin

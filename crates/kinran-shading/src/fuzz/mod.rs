@@ -21,9 +21,9 @@ mod phase;
 mod sampling;
 
 pub use ambient::{
-    fuzz_ambient_attenuation, fuzz_ambient_direction, fuzz_ambient_factor, fuzz_ambient_mean,
-    fuzz_ambient_place, fuzz_ambient_radiance, fuzz_ambient_tabulated, fuzz_g, fuzz_g_talk, fuzz_q,
-    fuzz_q_talk,
+    FUZZ_TABLE_SIZE, fuzz_ambient_attenuation, fuzz_ambient_direction, fuzz_ambient_factor,
+    fuzz_ambient_mean, fuzz_ambient_place, fuzz_ambient_radiance, fuzz_ambient_tabulated, fuzz_g,
+    fuzz_g_talk, fuzz_q, fuzz_q_talk,
 };
 pub use deferred::{
     FUZZ_DEFERRED_ALBEDO, FUZZ_DEFERRED_ALPHA, FUZZ_DEFERRED_DENSITY, FUZZ_WRAP, fuzz_deferred,

@@ -8,7 +8,7 @@ use kinran_image::{
     Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Role, Texture, Transfer, full_level_count,
     level_size, write_png,
 };
-use kinran_scene::{Document, Scene, Slot, TextureExtension, TextureRef};
+use kinran_scene::{Document, FUZZ_EXTENSION, Scene, Slot, TextureExtension, TextureRef};
 use serde_json::Value;
 
 use super::{
@@ -59,6 +59,15 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
     }
     report.curvature = curvature::bake(args, console, &scene, &mut document, &mut report.warnings)?;
 
+    for (i, material) in scene.materials.iter().enumerate().take(document.material_count()) {
+        let extensions = document.material(i).get("extensions");
+        let has = |name| extensions.is_some_and(|e| e.get(name).is_some());
+        if let (Some(fuzz), true, false) = (&material.fuzz, has(FUZZ_EXTENSION), has("KHR_materials_sheen")) {
+            // What viewers show that know nothing of fuzz.
+            fuzz.write(document.material_mut(i));
+            document.use_extension("KHR_materials_sheen", false);
+        }
+    }
     report.warnings.extend(document.write(&output)?);
     report.write(&args.output().join(format!("{stem}.kinran.json")))?;
     Ok(report)

@@ -4,7 +4,7 @@ use glam::Vec2;
 
 /// A number in [0, 1) that depends on nothing but its arguments (PCG's output permutation; Jarzynski, Olano.
 /// Hash Functions for GPU Rendering. JCGT 2020).
-pub(super) fn random(x: i32, y: i32, seed: u32) -> f32 {
+pub(crate) fn random(x: i32, y: i32, seed: u32) -> f32 {
     let pcg = |v: u32| {
         let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
         let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
@@ -15,12 +15,12 @@ pub(super) fn random(x: i32, y: i32, seed: u32) -> f32 {
 }
 
 /// As [`random`], in [-1, 1).
-pub(super) fn signed(x: i32, y: i32, seed: u32) -> f32 {
+pub(crate) fn signed(x: i32, y: i32, seed: u32) -> f32 {
     2.0 * random(x, y, seed) - 1.0
 }
 
 /// Smooth noise in [-1, 1], random at whole coordinates, that repeats after `period` along each axis.
-pub(super) fn noise(p: Vec2, period: [i32; 2], seed: u32) -> f32 {
+pub(crate) fn noise(p: Vec2, period: [i32; 2], seed: u32) -> f32 {
     let corner = p.floor();
     let f = p - corner;
     let f = f * f * (Vec2::splat(3.0) - 2.0 * f);

@@ -1,0 +1,226 @@
+//! A layer of fibres over a material, at a point.
+
+use glam::{Mat3, Vec3, Vec4Swizzles};
+use kinran_scene::{Fuzz, FuzzAttenuation, FuzzPhase};
+use kinran_shading::fuzz::{
+    FUZZ_DEFERRED_ALPHA, FUZZ_DEFERRED_DENSITY, FuzzView, fibre_direction, fibre_p_s, fuzz_alpha,
+    fuzz_ambient_factor, fuzz_attenuation, fuzz_deferred, fuzz_deferred_color, fuzz_deferred_escape, fuzz_g,
+    fuzz_layer, fuzz_light, fuzz_over_base_shares, fuzz_p_s, fuzz_passage, fuzz_smooth_normal, fuzz_view,
+    velvet_k, velvet_phase,
+};
+
+use super::geometry::SurfacePoint;
+use super::render::TextureFiltering;
+use super::scene::BoundTexture;
+use super::shading::{N_V_MIN, sample, sample_bound};
+
+/// Coefficients for one tilt and spread, as the shader library's functions of these names take them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FuzzCoefficients {
+    /// `fuzz_p_s`.
+    pub p_s: [f32; 6],
+    /// `fuzz_ambient_factor`.
+    pub ambient: [f32; 8],
+    /// `fuzz_ambient_direction`.
+    pub direction: [f32; 4],
+    /// `fuzz_ambient_attenuation`.
+    pub r: f32,
+}
+
+/// Tilts, evenly from upright to lying, that a layer has coefficients for.
+pub const FUZZ_TILTS: usize = 9;
+
+/// Fuzz with its textures.
+#[derive(Clone, Debug)]
+pub struct RenderFuzz {
+    /// What the material says; its texture references are not looked at.
+    pub fuzz: Fuzz,
+    /// Direction of fibres in tangent space, mapped from [-1, 1] to [0, 1].
+    pub direction: Option<BoundTexture>,
+    /// Linear RGB.
+    pub color: Option<BoundTexture>,
+    /// R: density of a layer, fuzziness of the simple form.
+    pub amount: Option<BoundTexture>,
+    /// For each of the tilts. The reference asks for them for velvet and for attenuation by albedo, the GPU always; filled
+    /// by [`RenderScene::fit_fuzz`](super::RenderScene::fit_fuzz).
+    pub coefficients: Option<Box<[FuzzCoefficients; FUZZ_TILTS]>>,
+    /// The GPU lights the layer from all around as the talk does, not along its lobe.
+    pub talk_ambient: bool,
+}
+
+impl RenderFuzz {
+    /// Whether the reference draws it without coefficients.
+    pub(crate) fn is_exact(&self) -> bool {
+        match &self.fuzz {
+            Fuzz::Layer(layer) => {
+                layer.phase == FuzzPhase::Fibre && layer.attenuation != FuzzAttenuation::Albedo
+            }
+            Fuzz::Simple { .. } => true,
+        }
+    }
+
+    /// Coefficients at a cosine of fibre and normal, between those of the nearest tilts.
+    fn coefficients_at(&self, t_n: f32) -> FuzzCoefficients {
+        let zero = FuzzCoefficients { p_s: [0.0; 6], ambient: [0.0; 8], direction: [0.0; 4], r: 0.0 };
+        let Some(table) = &self.coefficients else { return zero };
+        let place = libm::acosf(t_n.clamp(0.0, 1.0)) / std::f32::consts::FRAC_PI_2 * (FUZZ_TILTS - 1) as f32;
+        let low = (place as usize).min(FUZZ_TILTS - 2);
+        let f = place - low as f32;
+        let (a, b) = (&table[low], &table[low + 1]);
+        FuzzCoefficients {
+            p_s: std::array::from_fn(|i| a.p_s[i] + (b.p_s[i] - a.p_s[i]) * f),
+            ambient: std::array::from_fn(|i| a.ambient[i] + (b.ambient[i] - a.ambient[i]) * f),
+            direction: std::array::from_fn(|i| a.direction[i] + (b.direction[i] - a.direction[i]) * f),
+            r: a.r + (b.r - a.r) * f,
+        }
+    }
+}
+
+/// Fuzz at a point for a view; directions in the frame of the base's shading.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FuzzAt {
+    n: Vec3,
+    t: Vec3,
+    v: Vec3,
+    color: Vec3,
+    view: FuzzView,
+    density: f32,
+    alpha: f32,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    Layer { phase: FuzzPhase, attenuation: FuzzAttenuation, p_s: [f32; 6], albedo: f32 },
+    Simple { fuzziness: f32, diffuse: Vec3 },
+}
+
+impl FuzzAt {
+    /// `to_world` is the mesh's tangent frame, turned to the viewer; `frame` and `v` are the base's; `diffuse` is its
+    /// diffuse albedo. `None` where there is no fuzz.
+    pub(crate) fn new(
+        fuzz: &RenderFuzz,
+        point: &SurfacePoint,
+        filtering: TextureFiltering,
+        to_world: Mat3,
+        frame: Mat3,
+        v: Vec3,
+        diffuse: Vec3,
+    ) -> Option<Self> {
+        let amount = sample(&fuzz.amount, point, filtering).x;
+        let layer = match &fuzz.fuzz {
+            Fuzz::Layer(layer) => layer,
+            Fuzz::Simple { fuzziness, .. } => {
+                let fuzziness = (fuzziness * amount).clamp(0.0, 1.0);
+                return (fuzziness > 0.0).then_some(FuzzAt {
+                    n: Vec3::Z,
+                    t: Vec3::Z,
+                    v,
+                    color: fuzz_deferred_color(diffuse, v.z),
+                    view: FuzzView { escaped: fuzz_deferred_escape(v.z), ..fuzz_view(v.z, v.z, 0.0, 1.0) },
+                    density: FUZZ_DEFERRED_DENSITY,
+                    alpha: FUZZ_DEFERRED_ALPHA,
+                    kind: Kind::Simple { fuzziness, diffuse },
+                });
+            }
+        };
+        let density = layer.density * amount;
+        if density <= 0.0 {
+            return None;
+        }
+        let to_shading = frame.transpose();
+        let vertex = (to_shading * to_world.z_axis).normalize_or(Vec3::Z);
+        let n = fuzz_smooth_normal(Vec3::Z, vertex, layer.normal_smoothness);
+        let tangent_space = match &fuzz.direction {
+            Some(texture) => {
+                (sample_bound(texture, point, filtering).xyz() * 2.0 - 1.0).normalize_or(Vec3::Z)
+            }
+            None => fibre_direction(layer.tilt, layer.azimuth),
+        };
+        let t = (to_shading * (to_world * tangent_space)).normalize_or(n);
+        // Fits are for fibres above the horizon; a fibre has no sign.
+        let t = if t.dot(n) < 0.0 { -t } else { t };
+        let n_v = n.dot(v).max(N_V_MIN);
+        let alpha = fuzz_alpha(layer.spread);
+        let color = layer.color * sample(&fuzz.color, point, filtering).xyz();
+        let coefficients = fuzz.coefficients_at(t.dot(n));
+        let albedo = fuzz_g(density, n_v) * fuzz_ambient_factor(coefficients.ambient, n_v, t.dot(v));
+        Some(FuzzAt {
+            n,
+            t,
+            v,
+            color,
+            view: fuzz_view(n_v, t.dot(v), density, alpha),
+            density,
+            alpha,
+            kind: Kind::Layer {
+                phase: layer.phase,
+                attenuation: layer.attenuation,
+                p_s: coefficients.p_s,
+                albedo: (albedo * color.max_element()).min(1.0),
+            },
+        })
+    }
+
+    /// The layer over what the base reflects for a light along `u`, BRDF times cosine; `n_u` is the base's cosine.
+    #[inline]
+    pub(crate) fn over(&self, u: Vec3, base: Vec3) -> Vec3 {
+        let n_u = self.n.dot(u);
+        let (phase, attenuation, p_s, albedo) = match self.kind {
+            Kind::Simple { fuzziness, diffuse } => {
+                let soft = self.color * fuzz_deferred(u.z, self.view.n_v, u.dot(self.v), self.view.escaped);
+                let lambert = diffuse * (std::f32::consts::FRAC_1_PI * u.z.max(0.0));
+                return base + fuzziness * (soft - lambert);
+            }
+            Kind::Layer { phase, attenuation, p_s, albedo } => (phase, attenuation, p_s, albedo),
+        };
+        if n_u <= 1e-4 {
+            return Vec3::ZERO;
+        }
+        let (t_u, u_v) = (self.t.dot(u), u.dot(self.v));
+        let (lobe, penetrated) = match phase {
+            FuzzPhase::Fibre => {
+                let light = fuzz_light(self.view, n_u, t_u, u_v);
+                (light.lobe, light.penetrated)
+            }
+            FuzzPhase::Velvet => {
+                let penetrated = fuzz_passage(self.density, n_u);
+                let p = velvet_phase(u_v, t_u, self.view.t_v, velvet_k(self.alpha * self.alpha));
+                (fuzz_layer(p, penetrated * self.view.escaped, n_u, self.view.n_v), penetrated)
+            }
+        };
+        let left = match attenuation {
+            FuzzAttenuation::None => Vec3::ONE,
+            FuzzAttenuation::Albedo => Vec3::splat(1.0 - albedo),
+            FuzzAttenuation::Unscattered => fuzz_attenuation(penetrated, self.view.escaped, 0.0, self.color),
+            FuzzAttenuation::Full => {
+                let downward = match phase {
+                    FuzzPhase::Fibre => fibre_p_s(n_u, t_u, self.t.dot(self.n), self.alpha),
+                    FuzzPhase::Velvet => fuzz_p_s(p_s, n_u, t_u),
+                };
+                fuzz_attenuation(penetrated, self.view.escaped, downward, self.color)
+            }
+        };
+        base * left + self.color * (lobe * n_u)
+    }
+
+    /// Direction and roughness of the fibres, for sampling.
+    pub(crate) fn fibres(&self) -> (Vec3, f32) {
+        (self.t, self.alpha)
+    }
+
+    /// Probabilities of sampling the layer, the specular lobe and the diffuse one of the base, whose brightness is given.
+    pub(crate) fn shares(&self, specular: f32, diffuse: f32) -> Vec3 {
+        let half_up = 0.5 * self.color.max_element() * fuzz_g(self.density, self.view.n_v);
+        let left = match self.kind {
+            Kind::Simple { fuzziness, .. } => {
+                return fuzz_over_base_shares(half_up * fuzziness, specular, diffuse * (1.0 - fuzziness));
+            }
+            Kind::Layer { attenuation: FuzzAttenuation::Full | FuzzAttenuation::Unscattered, .. } => {
+                self.view.escaped
+            }
+            Kind::Layer { .. } => 1.0,
+        };
+        fuzz_over_base_shares(half_up, specular * left, diffuse * left)
+    }
+}
