@@ -85,7 +85,7 @@ impl GpuScene {
         self.scene.lights = lights;
     }
 
-    /// Other factors for a material from the next frame on; its textures stay, as does the pass that draws it.
+    /// Other factors and another fuzz for a material from the next frame on; its textures stay.
     pub fn set_material(
         &mut self,
         gpu: &Gpu,
@@ -96,6 +96,7 @@ impl GpuScene {
         let floats = material_floats(material, adjustment);
         gpu.queue.write_buffer(&self.materials[index].uniform, 0, &bytes(&floats));
         gpu.queue.write_buffer(&self.materials[index].fuzz, 0, &bytes(&fuzz::floats(material)));
+        self.materials[index].path = path(material);
     }
 
     pub(super) fn new(gpu: &Gpu, layouts: &Layouts, scene: &RenderScene, light: &GpuLight) -> Self {
@@ -350,12 +351,16 @@ fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> M
         layout: &layouts.material,
         entries: &entries,
     });
-    let path = if m.alpha_mode == AlphaMode::Blend || m.transmissive {
+    Material { uniform, fuzz, bind_group, path: path(m), double_sided: m.double_sided }
+}
+
+/// The pass that draws a material.
+fn path(m: &RenderMaterial) -> Path {
+    if m.alpha_mode == AlphaMode::Blend || m.transmissive {
         Path::Blended
     } else if m.surface.is_some() || fuzz::is_forward(m) {
         Path::Forward
     } else {
         Path::Deferred
-    };
-    Material { uniform, fuzz, bind_group, path, double_sided: m.double_sided }
+    }
 }

@@ -12,6 +12,7 @@ use kinran_render::reference::{Background, Film};
 use kinran_render::tonemap::to_srgb8;
 use kinran_scene::Light;
 
+use super::fuzz::FuzzParameters;
 use super::loader::{self, Event, Job, Loader, Opened};
 use super::orbit::Orbit;
 use super::panel::{KEYS, Shown, Wishes, panel};
@@ -176,6 +177,7 @@ impl App {
                 normal_scale: 1.0,
                 emissive: m.emissive_factor.to_array(),
                 occlusion: m.occlusion_strength,
+                fuzz: FuzzParameters::from(&m.fuzz),
             })
             .collect();
         // Saved parameters belong to a model with as many materials.
@@ -249,6 +251,7 @@ impl App {
                     material.roughness_factor = m.roughness;
                     material.emissive_factor = Vec3::from(m.emissive);
                     material.occlusion_strength = m.occlusion;
+                    material.fuzz = m.fuzz.fuzz(&model.opened.scene.materials[i].fuzz);
                     let authored = model.authored[i].roughness.max(1e-3);
                     let relative = MaterialParameters { roughness: m.roughness / authored, ..m.clone() };
                     scene.set_material(&self.gpu, i, &material, relative.adjustment(mapped));

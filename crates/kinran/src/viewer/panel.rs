@@ -139,6 +139,7 @@ pub(super) fn panel(ui: &mut Ui, p: &mut Parameters, selected: &mut usize, shown
         ui.add(Slider::new(&mut m.rotation, -90.0..=90.0).text("rotation").suffix("°"));
         ui.add(Slider::new(&mut m.normal_scale, 0.0..=4.0).text("normal scale"));
         ui.add(Slider::new(&mut m.occlusion, 0.0..=1.0).text("occlusion strength"));
+        m.fuzz.sliders(ui);
         ui.horizontal(|ui| {
             ui.color_edit_button_rgb(&mut m.emissive);
             ui.label("emitted (linear)");

@@ -10,6 +10,7 @@ use kinran_render::tonemap::Tonemap;
 use kinran_scene::{Light, LightKind};
 use serde::{Deserialize, Serialize};
 
+use super::fuzz::FuzzParameters;
 use super::orbit::Orbit;
 use crate::Error;
 use crate::surfaces::Mips;
@@ -49,6 +50,8 @@ pub(super) struct MaterialParameters {
     pub(super) normal_scale: f32,
     pub(super) emissive: [f32; 3],
     pub(super) occlusion: f32,
+    #[serde(default)]
+    pub(super) fuzz: FuzzParameters,
 }
 
 impl MaterialParameters {
