@@ -122,7 +122,8 @@ fn place((x, y): (f64, f64), angle: f64, r: f64) -> (f64, f64) {
 }
 
 fn curve(svg: &mut String, centre: (f64, f64), color: &str, phase: impl Fn(Vec3) -> f32) {
-    const STEPS: usize = 720;
+    // A degree off the direction opposite to the view, where single precision has no half vector.
+    const STEPS: usize = 180;
     let angle = |i: usize| TAU * (i as f64 + 0.5) / STEPS as f64 - PI;
     let values: Vec<f64> = (0..STEPS)
         .map(|i| phase(vec3(libm::sin(angle(i)) as f32, 0.0, libm::cos(angle(i)) as f32)).into())
