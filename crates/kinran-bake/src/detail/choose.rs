@@ -1,4 +1,4 @@
-//! Which block of several to keep: the one whose blended result is nearest to the target.
+//! Which block of several to keep: the one whose blended result is nearest to the target. For BC1 and BC4.
 //!
 //! An encoder sees `s` alone and weighs all texels alike. But the blend has slope 0.1 here and 4 there, and texels
 //! next to each other have different tiles under them, so of many blocks equally near to `s` one is much nearer to the
@@ -11,7 +11,7 @@
 
 use kinran_image::Format;
 
-use super::code::code_from_linear;
+use super::code::{code_from_linear, linear_from_byte};
 use super::map::MapKind;
 use super::solve::{Blend, Operator, Plain, Smooth};
 
@@ -28,6 +28,9 @@ pub(crate) struct ChooseBand<'a> {
     pub(crate) detail: &'a [[Vec<f32>; 3]],
     pub(crate) kind: MapKind,
     pub(crate) blend: Blend,
+    /// `s` is stored as sRGB code.
+    pub(crate) srgb: bool,
+    pub(crate) format: Format,
     /// What an encoder made of `s`.
     pub(crate) blocks: &'a mut [u8],
 }
@@ -63,18 +66,27 @@ impl ChooseBand<'_> {
             }
             for channel in 0..3 {
                 for i in 0..TEXELS {
-                    goal.s[channel][i] = blend.inverse(goal.t[channel][i], goal.d[channel][i]);
+                    let s = blend.inverse(goal.t[channel][i], goal.d[channel][i]);
+                    let (v, slope) = stored(s, self.srgb);
+                    let step = blend.slope(s, goal.d[channel][i]) * goal.gain[channel][i] * slope;
+                    goal.v[channel][i] = v;
+                    goal.weight[channel][i] = step * step;
                 }
             }
-            choose_bc1(block, &goal, blend);
+            match self.format {
+                Format::Bc4 => choose_bc4(block, &goal, blend),
+                _ => choose_bc1(block, &goal, self.srgb, blend),
+            }
         }
     }
 }
 
 /// What a block of `s` should achieve, for colour and data, texels row by row.
 struct BlockGoal {
-    /// The exact solution.
-    s: [[f32; TEXELS]; 3],
+    /// The exact solution as it would be stored, 0 to 1.
+    v: [[f32; TEXELS]; 3],
+    /// Steps of 8 bits of the map's code, squared, for a small squared difference in what is stored.
+    weight: [[f32; TEXELS]; 3],
     /// The detail.
     d: [[f32; TEXELS]; 3],
     /// The target.
@@ -86,7 +98,7 @@ struct BlockGoal {
 impl BlockGoal {
     fn zeros() -> Self {
         let zeros = [[0.0; TEXELS]; 3];
-        BlockGoal { s: zeros, d: zeros, t: zeros, gain: zeros }
+        BlockGoal { v: zeros, weight: zeros, d: zeros, t: zeros, gain: zeros }
     }
 }
 
@@ -100,7 +112,27 @@ fn code_gain(kind: MapKind, t: f32) -> f32 {
 
 /// Formats in which blocks are chosen by what they are blended to.
 pub(crate) fn can_choose(format: Format, kind: MapKind) -> bool {
-    format == Format::Bc1 && matches!(kind, MapKind::Color | MapKind::Data)
+    matches!((format, kind), (Format::Bc1, MapKind::Color | MapKind::Data) | (Format::Bc4, MapKind::Data))
+}
+
+/// What is stored for `s`, 0 to 1, and the derivative of `s` by it; the inverse of
+/// [`detail_from_texel`](kinran_shading::detail::detail_from_texel), through the sRGB curve where that is stored.
+#[inline(always)]
+fn stored(s: f32, srgb: bool) -> (f32, f32) {
+    let texel = (s * 254.0 + 1.0) * (1.0 / 255.0);
+    if !srgb {
+        return (texel, 255.0 / 254.0);
+    }
+    let code = code_from_linear(texel);
+    let slope = if texel <= 0.003_130_8 { 1.0 / 12.92 } else { 2.4 * texel / (code + 0.055) };
+    (code, slope * (255.0 / 254.0))
+}
+
+/// The `s` that a stored byte stands for.
+#[inline(always)]
+fn synthesized(byte: u8, srgb: bool) -> f32 {
+    let texel = if srgb { linear_from_byte(byte) } else { f32::from(byte) * (1.0 / 255.0) };
+    (texel * (255.0 / 254.0) - 1.0 / 254.0).max(0.0)
 }
 
 /// Rounds of fitting end points to the texels that chose them. The third gains less than a thousandth.
@@ -108,22 +140,21 @@ const ROUNDS: usize = 2;
 
 /// Replaces a BC1 block by one whose blended result is nearer to the target, if there is one: texels choose again among
 /// its four colours by what they are blended to; then the end points follow by least squares, weighted by the slope of
-/// the blend; and so on. `slope` is the blend's derivative.
+/// the blend; and so on.
 #[inline(always)]
-fn choose_bc1(block: &mut [u8; 8], goal: &BlockGoal, blend: impl Operator) {
+fn choose_bc1(block: &mut [u8; 8], goal: &BlockGoal, srgb: bool, blend: impl Operator) {
     let ends = [u16::from_le_bytes([block[0], block[1]]), u16::from_le_bytes([block[2], block[3]])];
     // The mode with three colours and black is not for maps without holes.
     if ends[0] < ends[1] {
         return;
     }
-    let weights = weights(goal, blend);
-    let mut best = assign(ends, goal, blend);
+    let mut best = assign(ends, goal, srgb, blend);
     for _ in 0..ROUNDS {
-        let ends = fit(&best.choices, goal, &weights);
+        let ends = fit(&best.choices, goal);
         if ends == best.ends {
             break;
         }
-        let fitted = assign(ends, goal, blend);
+        let fitted = assign(ends, goal, srgb, blend);
         if fitted.error >= best.error {
             break;
         }
@@ -174,18 +205,18 @@ const SHARES: [f32; 4] = [1.0, 0.0, 2.0 / 3.0, 1.0 / 3.0];
 
 /// The four values of `s` in a channel, with the 8 bits that decoders round to.
 #[inline(always)]
-fn palette(ends: [u16; 2], channel: usize) -> [f32; 4] {
+fn palette(ends: [u16; 2], channel: usize, srgb: bool) -> [f32; 4] {
     let (a, b) = (f32::from(channels(ends[0])[channel]), f32::from(channels(ends[1])[channel]));
     SHARES.map(|share| {
         let byte = ((b + (a - b) * share) * (255.0 / LARGEST[channel]) + 0.5) as u8;
-        (f32::from(byte) * (1.0 / 254.0) - 1.0 / 254.0).max(0.0)
+        synthesized(byte, srgb)
     })
 }
 
 /// Lets each texel take the colour that is blended nearest to its target.
 #[inline(always)]
-fn assign(ends: [u16; 2], goal: &BlockGoal, blend: impl Operator) -> Candidate {
-    let palettes: [[f32; 4]; 3] = [palette(ends, 0), palette(ends, 1), palette(ends, 2)];
+fn assign(ends: [u16; 2], goal: &BlockGoal, srgb: bool, blend: impl Operator) -> Candidate {
+    let palettes: [[f32; 4]; 3] = [0, 1, 2].map(|channel| palette(ends, channel, srgb));
     let mut least = [f32::INFINITY; TEXELS];
     let mut choices = [0_i32; TEXELS];
     for choice in 0..4 {
@@ -207,47 +238,98 @@ fn assign(ends: [u16; 2], goal: &BlockGoal, blend: impl Operator) -> Candidate {
     Candidate { ends, choices: choices.map(|c| c as u8), error: sum(&least) }
 }
 
-/// What a small error of `s` costs, squared.
-#[inline(always)]
-fn weights(goal: &BlockGoal, blend: impl Operator) -> [[f32; TEXELS]; 3] {
-    let mut weights = [[0.0; TEXELS]; 3];
-    for channel in 0..3 {
-        for i in 0..TEXELS {
-            let step = blend.slope(goal.s[channel][i], goal.d[channel][i]) * goal.gain[channel][i];
-            weights[channel][i] = step * step;
-        }
-    }
-    weights
-}
-
 /// The end points nearest to the exact solution, given what each texel takes of them.
 #[inline(always)]
-fn fit(choices: &[u8; TEXELS], goal: &BlockGoal, weights: &[[f32; TEXELS]; 3]) -> [u16; 2] {
+fn fit(choices: &[u8; TEXELS], goal: &BlockGoal) -> [u16; 2] {
     let shares = choices.map(|choice| SHARES[usize::from(choice)]);
     let mut ends = [0_u16; 2];
     for channel in 0..3 {
-        let (s, w) = (&goal.s[channel], &weights[channel]);
-        let sum_of = |term: &dyn Fn(usize) -> f32| sum(&std::array::from_fn(term));
-        let aa = sum_of(&|i| w[i] * shares[i] * shares[i]);
-        let ab = sum_of(&|i| w[i] * shares[i] * (1.0 - shares[i]));
-        let bb = sum_of(&|i| w[i] * (1.0 - shares[i]) * (1.0 - shares[i]));
-        let sa = sum_of(&|i| w[i] * shares[i] * s[i]);
-        let sb = sum_of(&|i| w[i] * (1.0 - shares[i]) * s[i]);
-        let determinant = aa * bb - ab * ab;
-        // Of a channel that weighs nothing, or all of whose texels took one colour, the mean is all there is to know.
-        let (a, b) = if determinant > 1e-4 * (aa + bb) * (aa + bb) {
-            ((sa * bb - sb * ab) / determinant, (sb * aa - sa * ab) / determinant)
-        } else {
-            let mean = (sa + sb) / (aa + 2.0 * ab + bb).max(1e-20);
-            (mean, mean)
-        };
+        let (a, b) = least_squares(&shares, &goal.v[channel], &goal.weight[channel]);
         let bits = [11, 5, 0][channel];
         for (end, value) in ends.iter_mut().zip([a, b]) {
-            let texel = (value.clamp(0.0, 1.0) * 254.0 + 1.0) / 255.0;
-            *end |= ((texel * LARGEST[channel] + 0.5) as u16) << bits;
+            *end |= ((value.clamp(0.0, 1.0) * LARGEST[channel] + 0.5) as u16) << bits;
         }
     }
     ends
+}
+
+/// The two ends whose mixtures, by the shares of the first, are nearest to `v`. Where all shares are alike or nothing has
+/// a weight, both are the mean.
+#[inline(always)]
+fn least_squares(shares: &[f32; TEXELS], v: &[f32; TEXELS], w: &[f32; TEXELS]) -> (f32, f32) {
+    let mut terms = [[0.0; TEXELS]; 5];
+    for i in 0..TEXELS {
+        let (a, b) = (shares[i], 1.0 - shares[i]);
+        for (term, value) in terms.iter_mut().zip([a * a, a * b, b * b, a * v[i], b * v[i]]) {
+            term[i] = w[i] * value;
+        }
+    }
+    let [aa, ab, bb, va, vb] = terms.each_ref().map(sum);
+    let determinant = aa * bb - ab * ab;
+    if determinant > 1e-4 * (aa + bb) * (aa + bb) {
+        ((va * bb - vb * ab) / determinant, (vb * aa - va * ab) / determinant)
+    } else {
+        let mean = (va + vb) / (aa + 2.0 * ab + bb).max(1e-20);
+        (mean, mean)
+    }
+}
+
+/// As [`choose_bc1`], for the one channel and eight values of BC4.
+#[inline(always)]
+fn choose_bc4(block: &mut [u8; 8], goal: &BlockGoal, blend: impl Operator) {
+    let ends = [block[0], block[1]];
+    // Six values, black and white: for blocks that reach both, and seldom.
+    if ends[0] < ends[1] {
+        return;
+    }
+    let mut best = assign_bc4(ends, goal, blend);
+    for _ in 0..ROUNDS {
+        let shares = best.1.map(share_bc4);
+        let (a, b) = least_squares(&shares, &goal.v[0], &goal.weight[0]);
+        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+        let ends = [byte(a.max(b)), byte(a.min(b))];
+        let fitted = assign_bc4(ends, goal, blend);
+        if fitted.2 >= best.2 {
+            break;
+        }
+        best = fitted;
+    }
+    let (ends, choices, _) = best;
+    let mut bits = 0_u64;
+    for (i, choice) in choices.into_iter().enumerate() {
+        let choice = if ends[0] == ends[1] { 0 } else { u64::from(choice) };
+        bits |= choice << (3 * i);
+    }
+    block[..2].copy_from_slice(&ends);
+    block[2..].copy_from_slice(&bits.to_le_bytes()[..6]);
+}
+
+/// Share of the first end in a value of BC4.
+#[inline(always)]
+fn share_bc4(choice: u8) -> f32 {
+    match choice {
+        0 => 1.0,
+        1 => 0.0,
+        choice => f32::from(8 - choice) / 7.0,
+    }
+}
+
+/// Lets each texel take the value that is blended nearest to its target; ends, choices and the error.
+#[inline(always)]
+fn assign_bc4(ends: [u8; 2], goal: &BlockGoal, blend: impl Operator) -> ([u8; 2], [u8; TEXELS], f32) {
+    let (a, b) = (f32::from(ends[0]), f32::from(ends[1]));
+    let mut least = [f32::INFINITY; TEXELS];
+    let mut choices = [0_i32; TEXELS];
+    for choice in 0..8_u8 {
+        let s = synthesized((b + (a - b) * share_bc4(choice) + 0.5) as u8, false);
+        for i in 0..TEXELS {
+            let difference = (blend.blend(s, goal.d[0][i]) - goal.t[0][i]) * goal.gain[0][i];
+            let better = difference * difference < least[i];
+            choices[i] = if better { i32::from(choice) } else { choices[i] };
+            least[i] = if better { difference * difference } else { least[i] };
+        }
+    }
+    (ends, choices.map(|c| c as u8), sum(&least))
 }
 
 /// A sum in a fixed order that runs in lanes.

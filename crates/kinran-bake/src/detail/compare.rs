@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::layer::{DetailRows, Layer, RowRoom, Seen, texture_bytes};
-use super::map::{MapKind, Planes, compress, decoded_level};
+use super::map::{MapKind, Planes, compress, decoded_level, synthesized_level};
 use super::sample::Fetch;
 use super::solve::{Blend, DetailOptions, Solved, Sums, Target, blend, solve, squared_error};
 
@@ -195,8 +195,8 @@ fn magnified_error(
     options: &DetailOptions,
     solved: &Solved,
 ) -> Result<f32, Error> {
-    // As stored: normals too are filtered before they are decoded.
-    let finest = [decoded_level(&solved.texture, 0, MapKind::Data)?];
+    // Normals too are filtered before they are decoded.
+    let finest = [synthesized_level(&solved.texture, 0)?];
     let wanted = &target.levels[0];
     let size = (wanted.width, wanted.height);
     let fetch = Fetch::new(&finest, size, Mat2::IDENTITY, Vec2::ZERO, Wrap::Clamp);

@@ -260,3 +260,12 @@ pub(crate) fn decoded_level(texture: &Texture, level: usize, kind: MapKind) -> R
     });
     Ok(planes)
 }
+
+/// A level of `s` as the sampler returns it: linear, whichever way it is stored.
+///
+/// # Errors
+/// As [`decoded_level`].
+pub(crate) fn synthesized_level(texture: &Texture, level: usize) -> Result<Planes, Error> {
+    let kind = if texture.transfer == Transfer::Srgb { MapKind::Color } else { MapKind::Data };
+    decoded_level(texture, level, kind)
+}

@@ -37,4 +37,4 @@ pub use layer::{Layer, LayerTransform, MAX_LAYERS, Mask, Tile, TileOptions, text
 pub use map::{MapKind, Planes};
 pub use paint::{Paint, PaintGuides};
 pub use pictures::{ERROR_GAIN, LevelPictures, level_pictures};
-pub use solve::{Blend, DetailOptions, LevelError, Solved, Target, solve, synthesize};
+pub use solve::{Blend, DetailOptions, LevelError, Solved, Target, blend_level, solve, synthesize};

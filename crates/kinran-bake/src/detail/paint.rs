@@ -81,11 +81,12 @@ impl Paint {
         })
     }
 
-    /// A target: the layers as authored, painted over. Bytes, as an authoring tool would export them.
+    /// A target: the layers as authored, painted over. Bytes, as an authoring tool would export them; one channel where
+    /// `grey` says that all are one.
     ///
     /// # Errors
     /// [`Error::Unsupported`] where the layers are not of `kind` or do not fit together.
-    pub fn target(&self, layers: &[Layer], kind: MapKind) -> Result<Image, Error> {
+    pub fn target(&self, layers: &[Layer], kind: MapKind, grey: bool) -> Result<Image, Error> {
         check_layers(layers, kind)?;
         let detail = DetailRows::new(layers, kind, self.size, Seen::Authored);
         let width = self.size.0 as usize;
@@ -103,7 +104,7 @@ impl Paint {
         let mut bytes = Vec::with_capacity(width * self.size.1 as usize * 3);
         for y in 0..self.size.1 as usize {
             for x in 0..width {
-                bytes.extend((0..3).map(|c| {
+                bytes.extend((0..if grey { 1 } else { 3 }).map(|c| {
                     let v = painted.row(c, y)[x];
                     match kind {
                         MapKind::Color => byte_from_linear(v),
@@ -113,7 +114,8 @@ impl Paint {
                 }));
             }
         }
-        Image::new(self.size.0, self.size.1, Channels::Rgb, Pixels::U8(bytes))
+        let channels = if grey { Channels::R } else { Channels::Rgb };
+        Image::new(self.size.0, self.size.1, channels, Pixels::U8(bytes))
     }
 
     fn texel(&self, kind: MapKind, texel: Vec3, i: usize, uv: (f32, f32)) -> Vec3 {

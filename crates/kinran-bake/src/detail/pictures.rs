@@ -1,12 +1,12 @@
 //! Pictures of a solved level, for people.
 
 use glam::Vec3;
-use kinran_image::{Channels, Error, Image, Pixels, encode_parallel};
+use kinran_image::{Channels, Error, Image, Pixels, Transfer, encode_parallel};
 use kinran_shading::normal_from_xy;
 
 use super::code::code_from_linear;
 use super::layer::{DetailRows, Layer, RowRoom, Seen};
-use super::map::{MapKind, Planes, bytes_of_planes, decoded_level, texture};
+use super::map::{MapKind, Planes, bytes_of_planes, decoded_level, synthesized_level, texture};
 use super::solve::{DetailOptions, Solved, Target, blend};
 use crate::mips::unorm8;
 
@@ -43,8 +43,8 @@ pub fn level_pictures(
     solved: &Solved,
     level: usize,
 ) -> Result<LevelPictures, Error> {
-    // Data, so that the texels come as they are stored.
-    let stored = decoded_level(&solved.texture, level, MapKind::Data)?;
+    let stored = synthesized_level(&solved.texture, level)?;
+    let srgb = solved.texture.transfer == Transfer::Srgb;
     let wanted = &target.levels[options.first_level + level];
     let (width, height) = (wanted.width, wanted.height);
     let encoded = encode_parallel(options.encoding, &bytes_of_planes(wanted, target.kind), width, height)?;
@@ -68,8 +68,15 @@ pub fn level_pictures(
             let [blended, wanted, alone] =
                 [blended, vector(wanted), vector(&alone)].map(|v| shown(v, target.kind));
             let error = |v: Vec3| ((v - wanted) * ERROR_GAIN).abs().min(Vec3::ONE);
-            let all =
-                [shown(detail, target.kind), texel, blended, wanted, alone, error(blended), error(alone)];
+            let all = [
+                shown(detail, target.kind),
+                if srgb { shown(texel, MapKind::Color) } else { texel },
+                blended,
+                wanted,
+                alone,
+                error(blended),
+                error(alone),
+            ];
             for (picture, v) in pictures.iter_mut().zip(all) {
                 picture.extend(v.to_array().map(|v| unorm8(v.clamp(0.0, 1.0))));
             }

@@ -1,6 +1,6 @@
 //! The solver: every texel's `s`, compressed, and how far the blended result is from the target.
 
-use glam::{Vec3, vec3};
+use glam::{Vec3, Vec4, vec3};
 use kinran_image::{Channels, Encoding, Error, Format, Image, Level, Texture, Transfer, decode, encode};
 use kinran_shading::detail::{
     detail_from_texel, detail_over, detail_over_inverse, overlay, overlay_color, overlay_inverse,
@@ -12,9 +12,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::choose::{ChooseBand, can_choose};
-use super::code::code_from_linear;
+use super::code::{byte_from_linear, code_from_linear, linear_from_byte};
 use super::layer::{DetailRows, Layer, RowRoom, Seen, check_layers};
-use super::map::{MapKind, Planes, mip_chain, planes_of_image, texture};
+use super::map::{MapKind, Planes, for_each_row, mip_chain, planes_of_image, synthesized_level, texture};
 
 /// How colour and data are blended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -85,6 +85,9 @@ pub struct DetailOptions {
     pub choose: bool,
     /// How `s` is compressed.
     pub encoding: Encoding,
+    /// How `s` of colour is stored: sRGB is finer where `s` is below 0.22, linear above. `None` tries both two levels below
+    /// the finest and keeps the better; all other kinds are linear.
+    pub transfer: Option<Transfer>,
     /// Levels of the target left out of `s`: its finest is this one.
     pub first_level: usize,
 }
@@ -98,6 +101,7 @@ impl DetailOptions {
             compensate: true,
             choose: true,
             encoding,
+            transfer: None,
             first_level: 0,
         }
     }
@@ -173,7 +177,7 @@ pub struct LevelError {
 #[derive(Clone, Debug)]
 pub struct Solved {
     /// `s` and its mips. Colour, data and normals are stored so that byte 128 is neutral, see
-    /// [`detail_from_texel`]; never sRGB.
+    /// [`detail_from_texel`]. Its [`transfer`](Texture::transfer) says whether colour is to be sampled with sRGB decoding.
     pub texture: Texture,
     /// For each level of `s`.
     pub levels: Vec<LevelError>,
@@ -210,20 +214,21 @@ pub fn solve(
         )));
     }
 
+    let transfer = better_transfer(target, layers, options)?;
     let mut levels = Vec::new();
     let mut errors = Vec::new();
     for level in options.first_level..target.levels.len() {
         let compensated = options.compensate && level > options.first_level;
-        let (data, error) = solve_level(target, layers, options, level, compensated, progress)?;
+        let (data, error) = solve_level(target, layers, options, level, (compensated, transfer), progress)?;
         let (width, height) = (target.levels[level].width, target.levels[level].height);
         levels.push(Level { width, height, data });
         errors.push(error);
     }
-    Ok(Solved { texture: texture(options.encoding.format, Transfer::Linear, levels), levels: errors })
+    Ok(Solved { texture: texture(options.encoding.format, transfer, levels), levels: errors })
 }
 
 /// The texels of one level of `s` before compression, RGBA of 8 bits as [`Solved::texture`] stores them, on the calling
-/// thread alone: solved against the tiles as the GPU decodes them.
+/// thread alone: solved against the tiles as the GPU decodes them, and linear unless `options.transfer` asks for sRGB.
 ///
 /// # Errors
 /// As [`solve`].
@@ -240,14 +245,31 @@ pub fn synthesize(
     let width = planes.width as usize;
     let rows = DetailRows::new(layers, target.kind, (planes.width, planes.height), Seen::Decoded);
     let (mut room, mut detail) = (RowRoom::default(), <[Vec<f32>; 3]>::default());
+    let srgb = target.kind == MapKind::Color && options.transfer == Some(Transfer::Srgb);
     let mut rgba8 = vec![0; width * planes.height as usize * 4];
     for (y, out) in rgba8.chunks_exact_mut(width * 4).enumerate() {
         rows.row(y, &mut room, &mut detail);
         let target_row = std::array::from_fn(|c| planes.row(c, y));
-        let row = SolveRow { target: target_row, detail: &detail, kind: target.kind, options, out };
+        let row = SolveRow { target: target_row, detail: &detail, kind: target.kind, srgb, options, out };
         pulp::Arch::new().dispatch(row);
     }
     Ok(rgba8)
+}
+
+/// How colour is stored with the lower error.
+fn better_transfer(target: &Target, layers: &[Layer], options: &DetailOptions) -> Result<Transfer, Error> {
+    if target.kind != MapKind::Color {
+        return Ok(Transfer::Linear);
+    }
+    if let Some(transfer) = options.transfer {
+        return Ok(transfer);
+    }
+    let level = (options.first_level + 2).min(target.levels.len() - 1);
+    let error = |transfer| -> Result<f32, Error> {
+        Ok(solve_level(target, layers, options, level, (options.compensate, transfer), &|_| {})?.1.error)
+    };
+    let (linear, srgb) = (error(Transfer::Linear)?, error(Transfer::Srgb)?);
+    Ok(if srgb < linear { Transfer::Srgb } else { Transfer::Linear })
 }
 
 fn solve_level(
@@ -255,7 +277,7 @@ fn solve_level(
     layers: &[Layer],
     options: &DetailOptions,
     level: usize,
-    compensated: bool,
+    (compensated, transfer): (bool, Transfer),
     progress: &(impl Fn(u64) + Sync),
 ) -> Result<(Vec<u8>, LevelError), Error> {
     let planes = &target.levels[level];
@@ -268,7 +290,8 @@ fn solve_level(
         .step_by(BAND)
         .map_init(RowRoom::default, |room, y0| {
             let rows = BAND.min(height as usize - y0);
-            let mut band = Band { planes, target, options, y0, rows, sums: Sums::default() };
+            let srgb = transfer == Transfer::Srgb;
+            let mut band = Band { planes, target, options, srgb, y0, rows, sums: Sums::default() };
             let result = band.solve(&decoded, authored.as_ref(), room);
             progress(u64::from(width) * rows as u64);
             result
@@ -288,6 +311,7 @@ struct Band<'a> {
     planes: &'a Planes,
     target: &'a Target,
     options: &'a DetailOptions,
+    srgb: bool,
     y0: usize,
     rows: usize,
     sums: Sums,
@@ -322,6 +346,8 @@ impl Band<'_> {
                 detail: if authored.is_some() { &before } else { &seen },
                 kind: self.target.kind,
                 blend: self.options.blend,
+                srgb: self.srgb,
+                format: self.options.encoding.format,
                 blocks: &mut blocks,
             });
         }
@@ -330,7 +356,8 @@ impl Band<'_> {
     }
 
     fn solve_row(&mut self, target: [&[f32]; 4], detail: &[Vec<f32>; 3], out: &mut [u8]) {
-        let row = SolveRow { target, detail, kind: self.target.kind, options: self.options, out };
+        let row =
+            SolveRow { target, detail, kind: self.target.kind, srgb: self.srgb, options: self.options, out };
         self.sums.unreached += pulp::Arch::new().dispatch(row);
     }
 
@@ -342,8 +369,11 @@ impl Band<'_> {
             let y = self.y0 + i;
             for x in 0..width {
                 let d = vec3(detail[0][x], detail[1][x], detail[2][x]);
-                let [r, g, b, _] = texels[i * width + x];
-                let blended = blend(vec3(r, g, b), d, self.target.kind, self.options);
+                let mut texel = Vec4::from(texels[i * width + x]).truncate();
+                if self.srgb {
+                    texel = Vec3::from(texel.to_array().map(|v| linear_from_byte((v * 255.0 + 0.5) as u8)));
+                }
+                let blended = blend(texel, d, self.target.kind, self.options);
                 let t = Vec3::from(std::array::from_fn(|c| self.planes.row(c, y)[x]));
                 self.sums.sum += squared_error(blended, t, self.target);
             }
@@ -351,6 +381,32 @@ impl Band<'_> {
         self.sums.texels += (width * self.rows) as u64;
         Ok(())
     }
+}
+
+/// What the runtime makes of level `level` of `s` and the layers under it, where a pixel is a texel of that level: linear
+/// light for colour, unit vectors for normals. Alpha is that of `s`.
+///
+/// # Errors
+/// [`Error::Unsupported`] where layers do not fit together, or there is no such level or it cannot be decoded.
+pub fn blend_level(
+    synthesized: &Texture,
+    layers: &[Layer],
+    kind: MapKind,
+    options: &DetailOptions,
+    level: usize,
+) -> Result<Planes, Error> {
+    check_layers(layers, kind)?;
+    let mut planes = synthesized_level(synthesized, level)?;
+    let rows = DetailRows::new(layers, kind, (planes.width, planes.height), Seen::Decoded);
+    for_each_row(&mut planes, |y, [a, b, c, _]| {
+        let (mut room, mut row) = (RowRoom::default(), <[Vec<f32>; 3]>::default());
+        rows.row(y, &mut room, &mut row);
+        for x in 0..a.len() {
+            let d = Vec3::from(row.each_ref().map(|plane| plane[x]));
+            (a[x], b[x], c[x]) = blend(vec3(a[x], b[x], c[x]), d, kind, options).into();
+        }
+    });
+    Ok(planes)
 }
 
 /// A texel of `s` as the sampler returns it, blended with a detail.
@@ -422,6 +478,7 @@ struct SolveRow<'a> {
     target: [&'a [f32]; 4],
     detail: &'a [Vec<f32>; 3],
     kind: MapKind,
+    srgb: bool,
     options: &'a DetailOptions,
     out: &'a mut [u8],
 }
@@ -431,12 +488,12 @@ impl pulp::WithSimd for SolveRow<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> u64 {
-        let SolveRow { target, detail, kind, options, out } = self;
+        let SolveRow { target, detail, kind, srgb, options, out } = self;
         match kind {
             MapKind::Color | MapKind::Data => {
                 match options.blend {
-                    Blend::Smooth => overlay_rows(target, detail, Smooth, out),
-                    Blend::Plain => overlay_rows(target, detail, Plain, out),
+                    Blend::Smooth => overlay_rows(target, detail, srgb, Smooth, out),
+                    Blend::Plain => overlay_rows(target, detail, srgb, Plain, out),
                 }
                 0
             }
@@ -479,7 +536,13 @@ fn synthesized_byte(s: f32) -> u8 {
 const RUN: usize = 64;
 
 #[inline(always)]
-fn overlay_rows(target: [&[f32]; 4], detail: &[Vec<f32>; 3], operator: impl Operator, out: &mut [u8]) {
+fn overlay_rows(
+    target: [&[f32]; 4],
+    detail: &[Vec<f32>; 3],
+    srgb: bool,
+    operator: impl Operator,
+    out: &mut [u8],
+) {
     let mut values = [[0.0_f32; RUN]; 4];
     let width = target[0].len();
     for (x0, out) in (0..width).step_by(RUN).zip(out.chunks_mut(RUN * 4)) {
@@ -497,7 +560,9 @@ fn overlay_rows(target: [&[f32]; 4], detail: &[Vec<f32>; 3], operator: impl Oper
         }
         for (i, out) in out.chunks_exact_mut(4).enumerate() {
             for (channel, out) in out.iter_mut().enumerate() {
-                *out = values[channel][i] as u8;
+                let value = values[channel][i];
+                *out =
+                    if srgb && channel < 3 { byte_from_linear((value - 0.5) / 255.0) } else { value as u8 };
             }
         }
     }

@@ -36,7 +36,8 @@ pub struct LibraryArgs {
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
 
-    /// Formats of colour, data and aniso maps; may be given again [default: bc1 and bc7]. Normals are BC5
+    /// Formats of colour, packed data and aniso maps; may be given again [default: bc1 and bc7]. Normals are BC5, grey
+    /// maps BC4
     #[arg(long, value_enum)]
     pub format: Vec<BlockFormat>,
 
@@ -57,6 +58,12 @@ pub struct LibraryArgs {
     pub no_pictures: bool,
 }
 
+impl LibraryArgs {
+    fn wants(&self, kind: MapKind) -> bool {
+        self.kind.is_empty() || self.kind.iter().any(|&name| MapKind::from(name) == kind)
+    }
+}
+
 /// A map of a material.
 #[derive(Clone, Debug)]
 struct MapFile {
@@ -64,6 +71,13 @@ struct MapFile {
     kind: MapKind,
     y_down: bool,
     image: Image,
+}
+
+impl MapFile {
+    /// Heights are only painted by, and so is occlusion where no data is asked for.
+    fn is_target(&self, args: &LibraryArgs) -> bool {
+        self.role != Role::Height && args.wants(self.kind)
+    }
 }
 
 struct Material {
@@ -147,16 +161,20 @@ pub fn report_library(args: &LibraryArgs, console: &Console) -> Result<LibraryRe
     let formats =
         if args.format.is_empty() { vec![BlockFormat::Bc1, BlockFormat::Bc7] } else { args.format.clone() };
     let pictures = args.output.join("pictures");
-    if !args.no_pictures {
-        std::fs::create_dir_all(&pictures).map_err(|e| kinran_image::Error::io(&pictures, e))?;
-    }
+    let folder = if args.no_pictures { &args.output } else { &pictures };
+    std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
     let total: usize =
-        materials.iter().map(|m| m.maps.iter().filter(|map| map.role != Role::Height).count()).sum();
+        materials.iter().map(|m| m.maps.iter().filter(|map| map.is_target(args)).count()).sum();
     let stage = console.progress().stage("painting and solving", total as u64);
     let mut report = LibraryReport { size: args.size, means: Vec::new(), rows: Vec::new() };
     for (i, material) in materials.iter().enumerate() {
-        for map in material.maps.iter().filter(|map| map.role != Role::Height) {
-            let formats = if map.kind == MapKind::Normal { &[BlockFormat::Bc5][..] } else { &formats };
+        for map in material.maps.iter().filter(|map| map.is_target(args)) {
+            let grey = matches!(map.image.channels, Channels::R | Channels::Rg);
+            let formats = match map.kind {
+                MapKind::Normal => &[BlockFormat::Bc5][..],
+                MapKind::Data if grey => &[BlockFormat::Bc4][..],
+                _ => &formats,
+            };
             for (n, format) in formats.iter().enumerate() {
                 let shown = (!args.no_pictures && n == 0).then_some(pictures.as_path());
                 report.rows.extend(solve_map(args, &materials, i, map, *format, shown)?);
@@ -229,7 +247,8 @@ fn solve_map(
         },
     ];
     let under: Vec<Layer> = own.iter().zip(&plain).map(|(layer, tile)| Layer { tile, ..*layer }).collect();
-    let image = paint.target(&under, map.kind)?;
+    let grey = matches!(map.image.channels, Channels::R | Channels::Rg);
+    let image = paint.target(&under, map.kind, map.kind == MapKind::Data && grey)?;
     let target = Target::new(&image, map.kind, false)?;
 
     let options = DetailOptions::new(encoding);
@@ -344,8 +363,6 @@ fn read_materials(args: &LibraryArgs) -> Result<Vec<Material>, Error> {
         .collect::<Result<_, _>>()?;
     folders.retain(|folder| folder.is_dir());
     folders.sort();
-    let wanted =
-        |kind: MapKind| args.kind.is_empty() || args.kind.iter().any(|&name| MapKind::from(name) == kind);
     let mut materials = Vec::new();
     for folder in folders {
         let mut maps: Vec<MapFile> = Vec::new();
@@ -361,14 +378,13 @@ fn read_materials(args: &LibraryArgs) -> Result<Vec<Material>, Error> {
                 _ => continue,
             };
             let guide = matches!(role, Role::Height | Role::Occlusion);
-            if maps.iter().any(|map| map.role == role) || !(guide || wanted(kind)) {
+            if maps.iter().any(|map| map.role == role) || !(guide || args.wants(kind)) {
                 continue;
             }
             let y_down = green == Some(Green::Down);
             maps.push(MapFile { role, kind, y_down, image: read_image(&file)? });
         }
-        let is_target = |map: &MapFile| map.role != Role::Height && wanted(map.kind);
-        if maps.iter().any(is_target) {
+        if maps.iter().any(|map| map.is_target(args)) {
             let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
             materials.push(Material { name, maps });
         }
