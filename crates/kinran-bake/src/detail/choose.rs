@@ -54,14 +54,20 @@ impl ChooseBand<'_> {
         for (i, block) in self.blocks.as_chunks_mut::<8>().0.iter_mut().enumerate() {
             let (x0, y0) = (i % columns * 4, i / columns * 4);
             let mut goal = BlockGoal::zeros();
+            let columns_inside = 4.min(self.width - x0);
+            let mut inside = [0.0; TEXELS];
             for (y, (target, detail)) in self.target[y0..].iter().zip(&self.detail[y0..]).take(4).enumerate()
             {
-                for x in 0..4.min(self.width - x0) {
-                    for channel in 0..3 {
-                        goal.t[channel][4 * y + x] = target[channel][x0 + x];
-                        goal.d[channel][4 * y + x] = detail[channel][x0 + x];
-                        goal.gain[channel][4 * y + x] = code_gain(self.kind, target[channel][x0 + x]);
-                    }
+                let row = 4 * y..4 * y + columns_inside;
+                inside[row.clone()].fill(1.0);
+                for channel in 0..3 {
+                    goal.t[channel][row.clone()].copy_from_slice(&target[channel][x0..x0 + columns_inside]);
+                    goal.d[channel][row.clone()].copy_from_slice(&detail[channel][x0..x0 + columns_inside]);
+                }
+            }
+            for channel in 0..3 {
+                for i in 0..TEXELS {
+                    goal.gain[channel][i] = code_gain(self.kind, goal.t[channel][i]) * inside[i];
                 }
             }
             for channel in 0..3 {
@@ -102,11 +108,16 @@ impl BlockGoal {
     }
 }
 
-/// Steps of 8 bits of the map's code for a small difference at the target `t`: for colour the slope of the sRGB curve.
+/// Steps of 8 bits of the map's code for a small difference at the target `t`: for colour the slope of the sRGB curve,
+/// from a fit of roots to it, `0.585122381 t^(1/2) + 0.783140355 t^(1/4) - 0.368262736 t^(1/8)`, which runs in lanes; its
+/// slope is within 3 % of the curve's. It is a weight, and errors are measured by the curve itself.
 #[inline(always)]
 fn code_gain(kind: MapKind, t: f32) -> f32 {
-    let curve = (code_from_linear(t) + 0.055) / (2.4 * t.max(1e-6));
-    let slope = if t <= 0.003_130_8 { 12.92 } else { curve };
+    let t = t.max(0.003_130_8);
+    let root = t.sqrt();
+    let fourth = root.sqrt();
+    let eighth = fourth.sqrt();
+    let slope = (0.292_561_2 * root + 0.195_785_09 * fourth - 0.046_032_842 * eighth) / t;
     255.0 * if kind == MapKind::Color { slope } else { 1.0 }
 }
 
@@ -342,4 +353,19 @@ fn sum(values: &[f32; TEXELS]) -> f32 {
         }
     }
     lanes[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_are_the_slope_of_the_srgb_curve() {
+        for i in 0..=1000 {
+            let t = 0.003_130_8 + i as f32 * 0.000_996;
+            let want = 255.0 * 1.055 / 2.4 * t.powf(1.0 / 2.4 - 1.0);
+            let got = code_gain(MapKind::Color, t);
+            assert!((got / want - 1.0).abs() < 0.03, "at {t}: wanted {want}, got {got}");
+        }
+    }
 }

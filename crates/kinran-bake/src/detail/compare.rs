@@ -56,7 +56,8 @@ pub fn compare(
     options: &DetailOptions,
     progress: &(impl Fn(u64) + Sync),
 ) -> Result<(Comparison, Solved), Error> {
-    let everything = DetailOptions { blend: Blend::Smooth, compensate: true, choose: true, ..*options };
+    let everything =
+        DetailOptions { blend: Blend::Smooth, compensate: true, choose: true, measure_all: true, ..*options };
     let talk = DetailOptions { choose: false, ..everything };
     let plain = DetailOptions { blend: Blend::Plain, ..talk };
     let uncompensated = DetailOptions { compensate: false, ..talk };

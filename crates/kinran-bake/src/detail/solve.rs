@@ -85,9 +85,11 @@ pub struct DetailOptions {
     pub choose: bool,
     /// How `s` is compressed.
     pub encoding: Encoding,
-    /// How `s` of colour is stored: sRGB is finer where `s` is below 0.22, linear above. `None` tries both two levels below
-    /// the finest and keeps the better; all other kinds are linear.
+    /// How `s` of colour is stored: sRGB is finer where `s` is below 0.22, linear above. `None` tries both three levels
+    /// below the finest and keeps the better; all other kinds are linear.
     pub transfer: Option<Transfer>,
+    /// Measures every texel; off, up to 16 bands of 16 rows a level, evenly spread.
+    pub measure_all: bool,
     /// Levels of the target left out of `s`: its finest is this one.
     pub first_level: usize,
 }
@@ -102,6 +104,7 @@ impl DetailOptions {
             choose: true,
             encoding,
             transfer: None,
+            measure_all: false,
             first_level: 0,
         }
     }
@@ -186,6 +189,9 @@ pub struct Solved {
 /// Rows in a band: the unit of parallel work, whole blocks.
 const BAND: usize = 16;
 
+/// Bands per level whose errors are measured, unless all are.
+const MEASURED_BANDS: usize = 16;
+
 /// Solves a target against its layers, all levels from `options.first_level` down, in parallel; `progress` is told how
 /// many texels were finished since it was last called. The bytes do not depend on the number of threads.
 ///
@@ -256,6 +262,9 @@ pub fn synthesize(
     Ok(rgba8)
 }
 
+/// Levels below the finest where both ways to store colour are tried: a 64th of the texels.
+const TRIAL_LEVEL: usize = 3;
+
 /// How colour is stored with the lower error.
 fn better_transfer(target: &Target, layers: &[Layer], options: &DetailOptions) -> Result<Transfer, Error> {
     if target.kind != MapKind::Color {
@@ -264,8 +273,9 @@ fn better_transfer(target: &Target, layers: &[Layer], options: &DetailOptions) -
     if let Some(transfer) = options.transfer {
         return Ok(transfer);
     }
-    let level = (options.first_level + 2).min(target.levels.len() - 1);
+    let level = (options.first_level + TRIAL_LEVEL).min(target.levels.len() - 1);
     let error = |transfer| -> Result<f32, Error> {
+        let options = &DetailOptions { measure_all: true, ..*options };
         Ok(solve_level(target, layers, options, level, (options.compensate, transfer), &|_| {})?.1.error)
     };
     let (linear, srgb) = (error(Transfer::Linear)?, error(Transfer::Srgb)?);
@@ -351,7 +361,11 @@ impl Band<'_> {
                 blocks: &mut blocks,
             });
         }
-        self.measure(&blocks, &seen)?;
+        let bands = (self.planes.height as usize).div_ceil(BAND);
+        if self.options.measure_all || (self.y0 / BAND).is_multiple_of(bands.div_ceil(MEASURED_BANDS)) {
+            self.measure(&blocks, &seen)?;
+        }
+        self.sums.solved += (width * self.rows) as u64;
         Ok((blocks, self.sums))
     }
 
@@ -454,6 +468,7 @@ pub(crate) struct Sums {
     pub(crate) texels: u64,
     pub(crate) sum: f64,
     pub(crate) unreached: u64,
+    pub(crate) solved: u64,
 }
 
 impl Sums {
@@ -461,6 +476,7 @@ impl Sums {
         self.texels += o.texels;
         self.sum += o.sum;
         self.unreached += o.unreached;
+        self.solved += o.solved;
     }
 
     pub(crate) fn error(&self, target: &Target) -> f32 {
@@ -469,7 +485,7 @@ impl Sums {
     }
 
     fn unreached(&self) -> f32 {
-        self.unreached as f32 / self.texels as f32
+        self.unreached as f32 / self.solved as f32
     }
 }
 
@@ -536,6 +552,10 @@ fn synthesized_byte(s: f32) -> u8 {
 const RUN: usize = 64;
 
 #[inline(always)]
+#[allow(
+    clippy::needless_range_loop,
+    reason = "loops over lanes of known length are what compilers vectorise"
+)]
 fn overlay_rows(
     target: [&[f32]; 4],
     detail: &[Vec<f32>; 3],
@@ -543,27 +563,45 @@ fn overlay_rows(
     operator: impl Operator,
     out: &mut [u8],
 ) {
-    let mut values = [[0.0_f32; RUN]; 4];
     let width = target[0].len();
-    for (x0, out) in (0..width).step_by(RUN).zip(out.chunks_mut(RUN * 4)) {
-        let len = RUN.min(width - x0);
+    for x0 in (0..width).step_by(RUN) {
+        let out = &mut out[4 * x0..4 * width.min(x0 + RUN)];
+        let mut texels = [0_u32; RUN];
         for channel in 0..3 {
-            let (mut t, mut d) = ([0.0; RUN], [0.0; RUN]);
-            t[..len].copy_from_slice(&target[channel][x0..x0 + len]);
-            d[..len].copy_from_slice(&detail[channel][x0..x0 + len]);
+            let (t, d) = (run_of(target[channel], x0), run_of(&detail[channel], x0));
             for i in 0..RUN {
-                values[channel][i] = operator.inverse(t[i], d[i]) * 254.0 + 1.5;
+                let texel = operator.inverse(t[i], d[i]) * 254.0 + 1.0;
+                texels[i] |=
+                    if srgb { u32::from(byte_from_linear(texel * (1.0 / 255.0))) } else { rounded(texel) }
+                        << (8 * channel);
             }
         }
-        for (value, alpha) in values[3].iter_mut().zip(&target[3][x0..x0 + len]) {
-            *value = alpha * 255.0 + 0.5;
+        let alpha = run_of(target[3], x0);
+        for i in 0..RUN {
+            texels[i] |= rounded(alpha[i] * 255.0) << 24;
         }
-        for (i, out) in out.chunks_exact_mut(4).enumerate() {
-            for (channel, out) in out.iter_mut().enumerate() {
-                let value = values[channel][i];
-                *out =
-                    if srgb && channel < 3 { byte_from_linear((value - 0.5) / 255.0) } else { value as u8 };
-            }
+        for (out, texel) in out.as_chunks_mut().0.iter_mut().zip(texels) {
+            *out = texel.to_le_bytes();
         }
     }
+}
+
+/// A run from `x0` on; beyond the row's end there are zeros.
+#[inline(always)]
+fn run_of(row: &[f32], x0: usize) -> [f32; RUN] {
+    match row[x0..].first_chunk() {
+        Some(run) => *run,
+        None => {
+            let mut run = [0.0; RUN];
+            run[..row.len() - x0].copy_from_slice(&row[x0..]);
+            run
+        }
+    }
+}
+
+/// The whole number nearest to a value in [0, 255], by the way floats of 2^23 and more have none but whole ones: a cast
+/// would keep the loop from running in lanes.
+#[inline(always)]
+fn rounded(v: f32) -> u32 {
+    (v + 8_388_608.0).to_bits() & 0xff
 }

@@ -26,14 +26,16 @@ pub fn overlay_color(s: Vec3, d: Vec3) -> Vec3 {
 /// The `s` with `overlay(s, d) = t`, for `t` and `d` in [0, 1].
 #[inline(always)]
 pub fn overlay_inverse(t: f32, d: f32) -> f32 {
-    let lower = t / (2.0 * d).max(TINY);
-    let upper = 1.0 - (1.0 - t) / (2.0 * (1.0 - d)).max(TINY);
-    if t < d {
-        lower
+    let darker = t < d;
+    // One division for both sides: it is what this costs.
+    let (part, whole) = if darker { (t, d) } else { (1.0 - t, 1.0 - d) };
+    let quotient = part / (2.0 * whole).max(TINY);
+    if darker {
+        quotient
     } else if d >= 1.0 {
         0.5
     } else {
-        upper
+        1.0 - quotient
     }
 }
 
