@@ -300,12 +300,25 @@ fn write_textures(
         Ok(())
     };
     write(format!("{stem}_synthesized"), &solved.texture, "synthesized")?;
-    for ((file, ..), tile) in tiles {
-        if !has_extension(file, "ktx2") && !has_extension(file, "dds") {
-            write(file_stem(file), &tile.texture, "detail")?;
+    for (key, tile) in tiles {
+        if !has_extension(&key.0, "ktx2") && !has_extension(&key.0, "dds") {
+            write(tile_name(key, tiles), &tile.texture, if key.2 { "mask" } else { "detail" })?;
         }
     }
     Ok(files)
+}
+
+/// Name of a tile's or mask's texture: the image's, after its folder's where others are called so too.
+fn tile_name(key: &(PathBuf, bool, bool), tiles: &Tiles) -> String {
+    let name = |(file, y_down, is_mask): &(PathBuf, bool, bool)| {
+        file_stem(file) + if *y_down { "_y_down" } else { "" } + if *is_mask { "_mask" } else { "" }
+    };
+    let mine = name(key);
+    let alone = tiles.keys().filter(|other| name(other) == mine).count() == 1;
+    match key.0.parent().and_then(Path::file_name) {
+        Some(folder) if !alone => format!("{}_{mine}", folder.to_string_lossy()),
+        _ => mine,
+    }
 }
 
 fn file_stem(path: &Path) -> String {
