@@ -45,5 +45,6 @@ fn check_writable(folder: &Path) -> Result<(), Error> {
         .prefix(".kinran-")
         .tempfile_in(folder)
         .map(drop)
-        .map_err(|e| kinran_image::Error::io(folder, e).into())
+        // The error itself would name the temporary file.
+        .map_err(|e| kinran_image::Error::io(folder, e.kind().into()).into())
 }
