@@ -88,7 +88,7 @@ fn no_layer_returns_more_than_the_furnace_brings() {
         for v in [Vec3::Z, vec3(0.8, 0.0, 0.6), vec3(0.0, 0.98, 0.2)] {
             let got =
                 seen_along(&lit(Some(Fuzz::Layer(layer.clone())), Some(white()), None), v.normalize(), 512);
-            assert!(got.x < 1.0 && got.x > 0.2, "{density} {spread} {tilt}, view {v}: {got}");
+            assert!(got.x < 1.0 && got.x > 0.15, "{density} {spread} {tilt}, view {v}: {got}");
         }
     }
     // Nothing on it is nothing.

@@ -28,7 +28,7 @@ use crate::{Console, Error, Progress, outputs};
 /// (the form for seven bits of a G-buffer, off and on). Every material gets the same fibres.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  kinran fuzz horse.gltf -o horse_fuzz/
+  kinran fuzz horse.gltf -o horse_fuzz/ --base 0.05,0.04,0.035
   kinran fuzz curtain.gltf -o crushed/ --direction swirl --spread 0.1 --tilt 50 --color 0.5,0.05,0.1 --sheet light
   kinran fuzz sofa.gltf -o felt/ --sheet simple")]
 pub struct Args {
@@ -59,6 +59,10 @@ pub struct Args {
     /// Linear albedo of the fibres, each 0 to 1
     #[arg(long, value_name = "R,G,B", default_value = "0.8,0.75,0.7", value_parser = vector)]
     pub color: Vec3,
+
+    /// Linear colour of the base under the fibres, in the place of the file's: velvet shows on a dark one
+    #[arg(long, value_name = "R,G,B", value_parser = vector)]
+    pub base: Option<Vec3>,
 
     /// Where fibres lean: as they do in the tangent frame, in noise, or in swirls
     #[arg(long, value_enum, default_value_t = Direction::Noise)]
@@ -116,9 +120,10 @@ struct Summary {
 /// One that names the flag or the file.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     outputs::check_folder(&args.output)?;
-    if args.color.min_element() < 0.0 || args.color.max_element() > 1.0 {
-        let Vec3 { x, y, z } = args.color;
-        return Err(Error::Usage(format!("--color {x},{y},{z}: each must lie in 0 to 1")));
+    for (flag, color) in [("--color", Some(args.color)), ("--base", args.base)] {
+        if let Some(Vec3 { x, y, z }) = color.filter(|c| c.min_element() < 0.0 || c.max_element() > 1.0) {
+            return Err(Error::Usage(format!("{flag} {x},{y},{z}: each must lie in 0 to 1")));
+        }
     }
     let scene = Scene::load(&args.file)?;
     let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
@@ -230,7 +235,13 @@ impl Studio<'_> {
             coefficients: None,
             talk_ambient: false,
         });
-        scene.materials.iter_mut().for_each(|material| material.fuzz.clone_from(&fuzz));
+        for material in &mut scene.materials {
+            material.fuzz.clone_from(&fuzz);
+            if let Some(base) = self.args.base {
+                material.base_color_factor = base.extend(material.base_color_factor.w);
+                material.base_color = None;
+            }
+        }
         scene.fit_fuzz(fuzz_coefficients);
         scene.lights.clone_from(&view.lights);
         scene.surroundings = view.environment.clone().map(|e| Arc::new(Surroundings::new(e)));
