@@ -74,9 +74,11 @@ pub(crate) fn face_tensors(surface: &Welded, normals: &[Vec3]) -> PointTensors {
         let yy = scale * (uv * uv * r0 - uu * uv * r1 + (uu * trace - uv * uv) * r2);
 
         let areas = corner_areas(&edge, &squared, double_area);
+        let [n, t, b] = [n, t, b].map(|v| v.as_vec3());
         for i in 0..3 {
             let point = triangle[i] as usize;
             let (cos, sin) = turn(normals[point], n, t, b);
+            let (cos, sin) = (f64::from(cos), f64::from(sin));
             // The triangle's tensor along the point's tangent and bitangent, both turned into the triangle.
             let (cc, ss, cs) = (cos * cos, sin * sin, cos * sin);
             let w = areas[i];
@@ -96,11 +98,10 @@ pub(crate) fn face_tensors(surface: &Welded, normals: &[Vec3]) -> PointTensors {
 
 /// Cosine and sine of the angle, in a triangle of normal `n` and frame `t`, `b`, of a point's tangent after the shortest
 /// arc from the point's normal to the triangle's. Opposite normals have no shortest arc; any tangent then.
-fn turn(point_normal: Vec3, n: DVec3, t: DVec3, b: DVec3) -> (f64, f64) {
-    let (tangent, _) = frame(point_normal);
-    let (from, tangent) = (point_normal.as_dvec3(), tangent.as_dvec3());
+fn turn(from: Vec3, n: Vec3, t: Vec3, b: Vec3) -> (f32, f32) {
+    let (tangent, _) = frame(from);
     let one_plus = 1.0 + from.dot(n);
-    if one_plus < 1e-9 {
+    if one_plus < 1e-6 {
         return (1.0, 0.0);
     }
     let turned = tangent - (from + n) * (n.dot(tangent) / one_plus);

@@ -1,7 +1,14 @@
 // The forward path: anisotropic GGX, and whatever else does not fit into the G-buffer.
 
-fn lit(surface: Surface, lobe: Lobe) -> vec3f {
-    var sum = surface.emitted + ambient(surface, lobe, 8u);
+fn lit(surface: Surface, lobe: Lobe, skin: Skin) -> vec3f {
+    var around = lobe;
+    if skin.kind > 0u {
+        around.diffuse = vec3f(0.0);
+    }
+    var sum = surface.emitted + ambient(surface, around, 8u);
+    if skin.kind > 0u {
+        sum += skin_ambient(skin, surface, lobe.diffuse);
+    }
     for (var i = 0u; i < frame.counts.x; i++) {
         let light = frame.lights[i];
         let incoming = incident(light, surface.position);
@@ -10,6 +17,20 @@ fn lit(surface: Surface, lobe: Lobe) -> vec3f {
             dot(surface.bitangent, incoming.direction),
             dot(surface.normal, incoming.direction),
         );
+        if skin.kind > 0u {
+            // Where the mesh turns away, the table says how far light comes around it.
+            let turned_away = dot(surface.geometric_normal, incoming.direction) <= 0.0;
+            var passed = 1.0;
+            if light.color.w > 0.5 && !turned_away {
+                passed = shadow(surface, incoming.direction);
+            }
+            var reflected = lobe.diffuse / PI * skin_punctual(skin, incoming.direction, turned_away);
+            if u.z > 0.0 && !turned_away {
+                reflected += skin_gloss(surface, lobe, u) * u.z;
+            }
+            sum += reflected * incoming.irradiance * passed;
+            continue;
+        }
         if u.z <= 0.0 && surface.fuzz.kind == FUZZ_NONE {
             continue;
         }
@@ -31,7 +52,11 @@ fn opaque(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f
         discard;
     }
     let view = normalize(frame.camera.xyz - in.position);
-    return vec4f(shown(surface, lit(surface, lobe_of(surface, view)), uv(in, 0u)), 1.0);
+    let skin = skin_at(in, surface, front);
+    if frame.counts.z == 7u {
+        return vec4f(skin_false_color(skin.curvature.w), 1.0);
+    }
+    return vec4f(shown(surface, lit(surface, lobe_of(surface, view), skin), uv(in, 0u)), 1.0);
 }
 
 // What a blended surface adds to what is behind it.
@@ -39,7 +64,7 @@ fn opaque(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f
 fn blended(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let surface = surface_at(in, front);
     let view = normalize(frame.camera.xyz - in.position);
-    return vec4f(surface.opacity * lit(surface, lobe_of(surface, view)), 1.0);
+    return vec4f(surface.opacity * lit(surface, lobe_of(surface, view), skin_at(in, surface, front)), 1.0);
 }
 
 // What a blended surface leaves of what is behind it.

@@ -59,6 +59,8 @@ pub enum Channel {
     Mip,
     /// Base colour.
     BaseColor,
+    /// Mean curvature of skin in false colour, black to white.
+    Curvature,
 }
 
 /// How to draw a frame.
@@ -530,6 +532,7 @@ impl Layouts {
         material.push(uniform);
         material.extend([filtered; 3]);
         material.extend([smooth; 3]);
+        material.extend([filtered; 2]);
         Layouts {
             frame: layout(&[
                 uniform,
@@ -580,6 +583,7 @@ impl Pipelines {
             "surface.wgsl",
             "fuzz_surface.wgsl",
             "channels.wgsl",
+            "skin.wgsl",
             "forward.wgsl",
         ];
         let fill = [
@@ -621,7 +625,7 @@ impl Pipelines {
                         files,
                         groups: &material,
                         vertex: "vertex",
-                        attributes: 5,
+                        attributes: 6,
                         fragment: Some(fragment),
                         targets,
                         blend,
@@ -717,7 +721,7 @@ fn pipeline(
         bind_group_layouts: &groups,
         immediate_size: 0,
     });
-    let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x4, 4 => Float32x4];
+    let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Float32x4];
     let buffers = [Some(wgpu::VertexBufferLayout {
         array_stride: VERTEX_FLOATS as u64 * 4,
         step_mode: wgpu::VertexStepMode::Vertex,

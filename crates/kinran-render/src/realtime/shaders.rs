@@ -8,13 +8,14 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use crate::Error;
 
 /// This folder's files.
-const FILES: [(&str, &str); 13] = [
+const FILES: [(&str, &str); 14] = [
     ("frame.wgsl", include_str!("frame.wgsl")),
     ("fuzz.wgsl", include_str!("fuzz.wgsl")),
     ("lighting.wgsl", include_str!("lighting.wgsl")),
     ("surface.wgsl", include_str!("surface.wgsl")),
     ("fuzz_surface.wgsl", include_str!("fuzz_surface.wgsl")),
     ("channels.wgsl", include_str!("channels.wgsl")),
+    ("skin.wgsl", include_str!("skin.wgsl")),
     ("forward.wgsl", include_str!("forward.wgsl")),
     ("octahedral.wgsl", include_str!("octahedral.wgsl")),
     ("gbuffer.wgsl", include_str!("gbuffer.wgsl")),
@@ -28,8 +29,18 @@ const FILES: [(&str, &str); 13] = [
 const TONEMAP: (&str, &str) = ("tonemap.wgsl", include_str!("tonemap.wgsl"));
 
 /// Modules of the library that the passes use.
-const LIBRARY: [&str; 8] =
-    ["ggx", "aniso", "multiscatter", "sh", "fuzz_layer", "fuzz_p_s", "fuzz_ambient", "fuzz_deferred"];
+const LIBRARY: [&str; 10] = [
+    "ggx",
+    "aniso",
+    "multiscatter",
+    "sh",
+    "fuzz_layer",
+    "fuzz_p_s",
+    "fuzz_ambient",
+    "fuzz_deferred",
+    "skin_curvature",
+    "skin_lighting",
+];
 
 /// Where shader text comes from.
 #[derive(Clone, Debug, Default)]

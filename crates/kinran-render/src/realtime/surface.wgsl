@@ -13,6 +13,11 @@ struct Material {
     adjustment: vec4f,
     // Rows of the six textures' transforms; w of the first row is the UV set.
     transforms: array<vec4f, 12>,
+    // x 0: no skin, else which curvature: 1 zero, 2 mean, 3 directional, 4 normalised; y one over the largest
+    // curvature of the tables, z that of the vertices' codes, w roughness of the second lobe of gloss.
+    skin: vec4f,
+    // xyz how far the normals of red, green and blue turn to the mesh's, w weight of the second lobe.
+    skin_gloss: vec4f,
 }
 
 @group(1) @binding(0) var<uniform> material: Material;
@@ -28,6 +33,8 @@ struct Material {
 @group(1) @binding(10) var metallic_roughness_sampler: sampler;
 @group(1) @binding(11) var occlusion_sampler: sampler;
 @group(1) @binding(12) var emissive_sampler: sampler;
+@group(1) @binding(20) var skin_table: texture_2d<f32>;
+@group(1) @binding(21) var skin_ambient_table: texture_2d<f32>;
 
 struct Vertex {
     @location(0) position: vec3f,
@@ -35,6 +42,7 @@ struct Vertex {
     @location(2) tangent: vec4f,
     @location(3) uvs: vec4f,
     @location(4) color: vec4f,
+    @location(5) curvature: vec4f,
 }
 
 struct Varying {
@@ -44,12 +52,13 @@ struct Varying {
     @location(2) tangent: vec4f,
     @location(3) uvs: vec4f,
     @location(4) color: vec4f,
+    @location(5) curvature: vec4f,
 }
 
 @vertex
 fn vertex(in: Vertex) -> Varying {
     let clip = frame.view_projection * vec4f(in.position, 1.0);
-    return Varying(clip, in.position, in.normal, in.tangent, in.uvs, in.color);
+    return Varying(clip, in.position, in.normal, in.tangent, in.uvs, in.color, in.curvature);
 }
 
 fn uv(in: Varying, texture: u32) -> vec2f {

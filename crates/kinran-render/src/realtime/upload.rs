@@ -10,10 +10,12 @@ use kinran_scene::{AlphaMode, Light, Wrap};
 use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
 
 use super::{Gpu, Layouts, fuzz, probe};
-use crate::reference::{BoundTexture, MipTexture, RenderMaterial, RenderScene, Surroundings};
+use crate::reference::{
+    BoundTexture, FLAT, MipTexture, RenderMaterial, RenderScene, SkinCurvature, SkinTable, Surroundings,
+};
 
-/// Floats of a vertex: position, normal, tangent, both UV sets, colour.
-pub(super) const VERTEX_FLOATS: usize = 3 + 3 + 4 + 4 + 4;
+/// Floats of a vertex: position, normal, tangent, both UV sets, colour, code of curvature.
+pub(super) const VERTEX_FLOATS: usize = 3 + 3 + 4 + 4 + 4 + 4;
 
 /// Which pass draws a material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,7 +95,7 @@ impl GpuScene {
         material: &RenderMaterial,
         adjustment: Adjustment,
     ) {
-        let floats = material_floats(material, adjustment);
+        let floats = material_floats(material, adjustment, self.scene.geometry.curvature_range());
         gpu.queue.write_buffer(&self.materials[index].uniform, 0, &bytes(&floats));
         gpu.queue.write_buffer(&self.materials[index].fuzz, 0, &bytes(&fuzz::floats(material)));
         self.materials[index].path = path(material);
@@ -113,6 +115,7 @@ impl GpuScene {
             vertices.extend(geometry.tangents[i].to_array());
             vertices.extend(geometry.uvs[i].iter().flat_map(|uv| uv.to_array()));
             vertices.extend(geometry.colors[i].to_array());
+            vertices.extend(geometry.curvature.get(i).copied().unwrap_or(FLAT).to_array());
         }
         let indices: Vec<u8> = geometry.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
         let mut draws: Vec<Draw> = Vec::new();
@@ -130,7 +133,10 @@ impl GpuScene {
         }
 
         let mut textures = Textures { gpu, views: HashMap::new(), samplers: HashMap::new() };
-        let materials = scene.materials.iter().map(|m| material(&mut textures, layouts, m)).collect();
+        let materials = {
+            let range = geometry.curvature_range();
+            scene.materials.iter().map(|m| material(&mut textures, layouts, m, range)).collect()
+        };
         Self {
             vertices: buffer(&bytes(&vertices), wgpu::BufferUsages::VERTEX),
             indices: buffer(&indices, wgpu::BufferUsages::INDEX),
@@ -282,6 +288,15 @@ fn encoded(gpu: &Gpu, texture: &MipTexture) -> Option<wgpu::TextureView> {
     (readable && whole).then(|| create_texture(gpu, (width, height), format, &levels))
 }
 
+/// A table of skin.
+fn skin_table(gpu: &Gpu, table: &SkinTable) -> wgpu::TextureView {
+    float_texture(
+        gpu,
+        (table.width as u32, table.height as u32),
+        &half_levels(std::slice::from_ref(&table.texels)),
+    )
+}
+
 /// The six textures of a material, `white` where it has none.
 fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTexture; 6] {
     [
@@ -295,7 +310,7 @@ fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTextur
 }
 
 /// The uniform that surface.wgsl declares.
-fn material_floats(m: &RenderMaterial, adjustment: Adjustment) -> Vec<f32> {
+fn material_floats(m: &RenderMaterial, adjustment: Adjustment, curvature_range: f32) -> Vec<f32> {
     let (mode, cutoff) = match m.alpha_mode {
         AlphaMode::Opaque => (0, 0.0),
         AlphaMode::Mask { cutoff } => (1, cutoff),
@@ -313,10 +328,27 @@ fn material_floats(m: &RenderMaterial, adjustment: Adjustment) -> Vec<f32> {
         floats.extend([x_axis.x, y_axis.x, z_axis.x, slot.uv_set as f32]);
         floats.extend([x_axis.y, y_axis.y, z_axis.y, 0.0]);
     }
+    let Some(skin) = &m.skin else {
+        floats.extend([0.0; 8]);
+        return floats;
+    };
+    let kind = match skin.curvature {
+        SkinCurvature::Zero => 1.0,
+        SkinCurvature::Mean => 2.0,
+        SkinCurvature::Directional => 3.0,
+        SkinCurvature::Normalized => 4.0,
+    };
+    floats.extend([kind, skin.tables.range.recip(), curvature_range, skin.second_alpha]);
+    floats.extend(skin.normal_blur.extend(skin.second_share).to_array());
     floats
 }
 
-fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> Material {
+fn material(
+    textures: &mut Textures,
+    layouts: &Layouts,
+    m: &RenderMaterial,
+    curvature_range: f32,
+) -> Material {
     let white = BoundTexture::constant([1.0; 4]);
     let slots = slots(m, &white);
     let buffer = |floats: &[f32]| {
@@ -326,7 +358,7 @@ fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> M
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         })
     };
-    let uniform = buffer(&material_floats(m, Adjustment::default()));
+    let uniform = buffer(&material_floats(m, Adjustment::default(), curvature_range));
     let fuzz = buffer(&fuzz::floats(m));
 
     let views = slots.map(|slot| textures.view(&slot.texture));
@@ -346,6 +378,15 @@ fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> M
     for resource in resources {
         entries.push(wgpu::BindGroupEntry { binding: entries.len() as u32, resource });
     }
+    let tables = m.skin.as_ref().map(|skin| [&skin.tables.punctual, &skin.tables.ambient]);
+    let tables: Vec<_> = match tables {
+        Some(tables) => tables.map(|table| skin_table(textures.gpu, table)).into(),
+        None => vec![views[0].clone(); 2],
+    };
+    for table in &tables {
+        let resource = wgpu::BindingResource::TextureView(table);
+        entries.push(wgpu::BindGroupEntry { binding: entries.len() as u32, resource });
+    }
     let bind_group = textures.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
         layout: &layouts.material,
@@ -358,7 +399,7 @@ fn material(textures: &mut Textures, layouts: &Layouts, m: &RenderMaterial) -> M
 fn path(m: &RenderMaterial) -> Path {
     if m.alpha_mode == AlphaMode::Blend || m.transmissive {
         Path::Blended
-    } else if m.surface.is_some() || fuzz::is_forward(m) {
+    } else if m.surface.is_some() || m.skin.is_some() || fuzz::is_forward(m) {
         Path::Forward
     } else {
         Path::Deferred

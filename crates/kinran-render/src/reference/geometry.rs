@@ -52,7 +52,7 @@ pub struct SurfacePoint {
 }
 
 /// The code of no curvature.
-const FLAT: Vec4 = Vec4::new(0.0, 128.0 / 255.0, 0.0, 0.0);
+pub const FLAT: Vec4 = Vec4::new(0.0, 128.0 / 255.0, 0.0, 0.0);
 
 impl Geometry {
     /// Places every instance of `scene`.

@@ -21,7 +21,7 @@ mod texture;
 pub use bvh::{Bvh, Hit};
 pub use camera::{CameraRay, PictureCamera, frame_box, look_at};
 pub use fuzz::{FUZZ_TILTS, FuzzCoefficients, RenderFuzz};
-pub use geometry::{Geometry, MAX_TRIANGLES, SurfacePoint};
+pub use geometry::{FLAT, Geometry, MAX_TRIANGLES, SurfacePoint};
 pub use render::{Background, Film, Settings, TextureFiltering, render};
 pub use scene::{BoundTexture, RenderMaterial, RenderScene, SurfaceTextures, Surroundings};
 pub use skin::{RenderSkin, SkinCurvature, SkinTable, SkinTables};

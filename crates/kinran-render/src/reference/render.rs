@@ -279,13 +279,12 @@ impl Renderer<'_> {
             if let (Some(at), Some(skin)) = (shading.skin, &self.scene.materials[point.material].skin) {
                 let u = to_shading * light.direction;
                 let scattered = shading.diffuse * FRAC_1_PI * skin.punctual(&at, light.direction);
+                if at.turns_away(light.direction) {
+                    sum += scattered * light.irradiance;
+                    continue;
+                }
                 let reflected = (scattered + shading.specular(u) * u.z.max(0.0)) * light.irradiance;
-                // Where the surface turns away, the table says how far light comes around it; a shadow ray would
-                // only meet the surface itself.
-                let turned_away = point.geometric_normal.dot(light.direction) <= 0.0;
-                if turned_away {
-                    sum += reflected;
-                } else if reflected.max_element() > 0.0 {
+                if reflected.max_element() > 0.0 {
                     sum += reflected * self.visibility(point, hit, view, light.direction, light.distance);
                 }
                 continue;

@@ -81,10 +81,20 @@ pub(crate) struct SkinPoint {
     bitangent: Vec3,
     tensor: Sym2,
     mean: f32,
+    /// The mesh's.
+    mesh_normal: Vec3,
     /// Of red, green and blue.
     normals: [Vec3; 3],
     pub(crate) second_alpha: f32,
     pub(crate) second_share: f32,
+}
+
+impl SkinPoint {
+    /// Whether the mesh turns away from a light along `u`. The table says how far light comes around it then; a shadow
+    /// ray would only meet the mesh itself.
+    pub(crate) fn turns_away(&self, u: Vec3) -> bool {
+        self.mesh_normal.dot(u) <= 0.0
+    }
 }
 
 impl RenderSkin {
@@ -98,23 +108,27 @@ impl RenderSkin {
             bitangent: y_axis.normalize_or_zero(),
             tensor,
             mean,
+            mesh_normal: mesh,
             normals: self.normal_blur.to_array().map(|blur| skin_normal(n, mesh, blur)),
             second_alpha: self.second_alpha,
             second_share: self.second_share,
         }
     }
 
-    /// What part of a light along `u`, in the world, leaves the skin again, times π.
+    /// What part of a light along `u`, in the world, leaves the skin again, times π. Where the mesh turns away, bumps do not
+    /// turn it back into a light that they cannot see.
     pub(crate) fn punctual(&self, at: &SkinPoint, u: Vec3) -> Vec3 {
+        let most = if at.turns_away(u) { 0.0 } else { 1.0 };
         let u_tb = vec2(u.dot(at.tangent), u.dot(at.bitangent));
         let curvature = match self.curvature {
-            SkinCurvature::Zero => return Vec3::from_array(at.normals.map(|n| n.dot(u).max(0.0))),
+            SkinCurvature::Zero => return Vec3::from_array(at.normals.map(|n| n.dot(u).clamp(0.0, most))),
             SkinCurvature::Mean => at.mean,
             SkinCurvature::Directional => curvature_from_light(at.tensor, u_tb),
             SkinCurvature::Normalized => curvature_from_light_normalized(at.tensor, u_tb),
         };
         let inverse_range = self.tables.range.recip();
-        let read = |n: Vec3| self.tables.punctual.sample(skin_lut_uv(n.dot(u), curvature, inverse_range));
+        let read =
+            |n: Vec3| self.tables.punctual.sample(skin_lut_uv(n.dot(u).min(most), curvature, inverse_range));
         if at.normals[0] == at.normals[1] && at.normals[1] == at.normals[2] {
             return read(at.normals[0]);
         }

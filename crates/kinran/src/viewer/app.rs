@@ -16,7 +16,7 @@ use super::fuzz::FuzzParameters;
 use super::loader::{self, Event, Job, Loader, Opened};
 use super::orbit::Orbit;
 use super::panel::{KEYS, Shown, Wishes, panel};
-use super::parameters::{CHANNELS, METHODS, MaterialParameters, Parameters};
+use super::parameters::{CHANNELS, METHODS, MaterialParameters, Parameters, SkinParameters};
 use crate::Error;
 use crate::render::write_rgb8;
 use crate::surfaces::Mips;
@@ -178,6 +178,7 @@ impl App {
                 emissive: m.emissive_factor.to_array(),
                 occlusion: m.occlusion_strength,
                 fuzz: FuzzParameters::from(&m.fuzz),
+                skin: m.skin.as_ref().map(SkinParameters::of),
             })
             .collect();
         // Saved parameters belong to a model with as many materials.
@@ -252,6 +253,9 @@ impl App {
                     material.emissive_factor = Vec3::from(m.emissive);
                     material.occlusion_strength = m.occlusion;
                     material.fuzz = m.fuzz.fuzz(&model.opened.scene.materials[i].fuzz);
+                    if let (Some(skin), Some(parameters)) = (&mut material.skin, &m.skin) {
+                        parameters.apply(skin);
+                    }
                     let authored = model.authored[i].roughness.max(1e-3);
                     let relative = MaterialParameters { roughness: m.roughness / authored, ..m.clone() };
                     scene.set_material(&self.gpu, i, &material, relative.adjustment(mapped));
@@ -364,7 +368,8 @@ impl App {
             p.exposure +=
                 if input.key_pressed(Key::Plus) || input.key_pressed(Key::Equals) { 1.0 / 3.0 } else { 0.0 };
             p.exposure -= if input.key_pressed(Key::Minus) { 1.0 / 3.0 } else { 0.0 };
-            let digits = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7];
+            let digits =
+                [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8];
             if let Some(i) = digits.iter().position(|&key| input.key_pressed(key)) {
                 p.channel = i;
             }

@@ -2,7 +2,9 @@
 
 use eframe::egui::{self, Slider, Ui};
 
-use super::parameters::{CHANNELS, METHODS, Parameters};
+use kinran_shading::skin::lighting::SKIN_NORMAL_BLUR;
+
+use super::parameters::{CHANNELS, CURVATURES, METHODS, Parameters};
 use crate::surfaces::Mips;
 
 /// What a control asks for beyond a changed parameter.
@@ -144,6 +146,22 @@ pub(super) fn panel(ui: &mut Ui, p: &mut Parameters, selected: &mut usize, shown
             ui.color_edit_button_rgb(&mut m.emissive);
             ui.label("emitted (linear)");
         });
+        if let Some(skin) = &mut m.skin {
+            ui.horizontal(|ui| {
+                for (i, (name, _)) in CURVATURES.iter().enumerate() {
+                    ui.selectable_value(&mut skin.curvature, i, *name);
+                }
+                ui.label("curvature");
+            });
+            for (channel, name) in skin.normal_blur.iter_mut().zip(["red", "green", "blue"]) {
+                ui.add(Slider::new(channel, 0.0..=1.0).text(format!("{name} normal, map to mesh")));
+            }
+            if ui.button("Normals by the profile").clicked() {
+                skin.normal_blur = SKIN_NORMAL_BLUR.to_array();
+            }
+            ui.add(Slider::new(&mut skin.second_share, 0.0..=1.0).text("second lobe of gloss"));
+            ui.add(Slider::new(&mut skin.second_roughness, 0.0..=1.0).text("its roughness"));
+        }
         wishes.reset_material = ui.button("As authored").clicked();
     });
     wishes
@@ -157,7 +175,7 @@ pub(super) const KEYS: [(&str, &str); 12] = [
     ("F", "frame the model"),
     ("C", "split line"),
     ("X", "swap both sides of the line"),
-    ("1 … 7", "lit, normal, alpha_t, alpha_b, direction, mip level, base colour"),
+    ("1 … 8", "lit, normal, alpha_t, alpha_b, direction, mip level, base colour, curvature"),
     ("+ −", "exposure by a third of a stop"),
     ("P", "save a picture beside the model"),
     ("Ctrl+S", "save all parameters beside the model"),

@@ -6,8 +6,10 @@ use glam::Vec3;
 use kinran_bake::aniso::Filter;
 use kinran_image::write_atomically;
 use kinran_render::realtime::{Adjustment, Channel};
+use kinran_render::reference::{RenderSkin, SkinCurvature};
 use kinran_render::tonemap::Tonemap;
 use kinran_scene::{Light, LightKind};
+use kinran_shading::ALPHA_MIN;
 use serde::{Deserialize, Serialize};
 
 use super::fuzz::FuzzParameters;
@@ -17,7 +19,7 @@ use crate::surfaces::Mips;
 use crate::view::{Curve, EnvironmentChoice, ViewArgs};
 
 /// Names and meanings of what can be shown of a surface.
-pub(super) const CHANNELS: [(&str, Channel); 7] = [
+pub(super) const CHANNELS: [(&str, Channel); 8] = [
     ("lit", Channel::Lit),
     ("normal", Channel::Normal),
     ("alpha_t", Channel::AlphaT),
@@ -25,6 +27,15 @@ pub(super) const CHANNELS: [(&str, Channel); 7] = [
     ("direction", Channel::Direction),
     ("mip level", Channel::Mip),
     ("base colour", Channel::BaseColor),
+    ("curvature", Channel::Curvature),
+];
+
+/// Names and meanings of the curvatures that skin can be lit with.
+pub(super) const CURVATURES: [(&str, SkinCurvature); 4] = [
+    ("zero", SkinCurvature::Zero),
+    ("mean", SkinCurvature::Mean),
+    ("directional", SkinCurvature::Directional),
+    ("normalised", SkinCurvature::Normalized),
 ];
 
 /// Names and meanings of the ways to filter.
@@ -52,6 +63,40 @@ pub(super) struct MaterialParameters {
     pub(super) occlusion: f32,
     #[serde(default)]
     pub(super) fuzz: FuzzParameters,
+    /// Where the material is skin.
+    #[serde(default)]
+    pub(super) skin: Option<SkinParameters>,
+}
+
+/// A material's skin as the sliders have it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct SkinParameters {
+    /// Index into [`CURVATURES`].
+    pub(super) curvature: usize,
+    /// How far the diffuse normals of red, green and blue turn to the mesh's.
+    pub(super) normal_blur: [f32; 3],
+    /// Weight of the second lobe of gloss.
+    pub(super) second_share: f32,
+    /// Its perceptual roughness.
+    pub(super) second_roughness: f32,
+}
+
+impl SkinParameters {
+    pub(super) fn of(skin: &RenderSkin) -> Self {
+        Self {
+            curvature: CURVATURES.iter().position(|(_, c)| *c == skin.curvature).unwrap_or(0),
+            normal_blur: skin.normal_blur.to_array(),
+            second_share: skin.second_share,
+            second_roughness: skin.second_alpha.sqrt(),
+        }
+    }
+
+    pub(super) fn apply(&self, skin: &mut RenderSkin) {
+        skin.curvature = CURVATURES[self.curvature.min(CURVATURES.len() - 1)].1;
+        skin.normal_blur = Vec3::from(self.normal_blur);
+        skin.second_share = self.second_share;
+        skin.second_alpha = (self.second_roughness * self.second_roughness).max(ALPHA_MIN);
+    }
 }
 
 impl MaterialParameters {
