@@ -361,6 +361,17 @@ pub(crate) struct Sheen {
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
+pub(crate) struct DiffuseTransmission {
+    #[serde(default)]
+    pub(crate) diffuse_transmission_factor: f32,
+    pub(crate) diffuse_transmission_texture: Option<TextureInfo>,
+    #[serde(default = "one3")]
+    pub(crate) diffuse_transmission_color_factor: [f32; 3],
+    pub(crate) diffuse_transmission_color_texture: Option<TextureInfo>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub(crate) struct EmissiveStrength {
     #[serde(default = "one")]
     pub(crate) emissive_strength: f32,

@@ -22,6 +22,6 @@ pub use environment::Environment;
 pub use error::Error;
 pub use fuzz::{FUZZ_EXTENSION, Fuzz, FuzzAttenuation, FuzzLayer, FuzzPhase, SHEEN_MATCH};
 pub use scene::{
-    AlphaMode, Anisotropy, Camera, Instance, Light, LightKind, Material, Primitive, Scene, Skin, SkinProfile,
-    Source, TextureRef, VertexCurvature, Wrap,
+    AlphaMode, Anisotropy, Camera, DiffuseTransmission, Instance, Light, LightKind, Material, Primitive,
+    Scene, Skin, SkinProfile, Source, TextureRef, VertexCurvature, Wrap,
 };

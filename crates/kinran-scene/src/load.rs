@@ -12,9 +12,9 @@ use serde::Deserialize;
 use crate::accessor::Accessors;
 use crate::container::{Resolver, beside, fetch, read_regular_file, split};
 use crate::{
-    AlphaMode, Anisotropy, Camera, Error, FUZZ_EXTENSION, Fuzz, FuzzAttenuation, FuzzLayer, FuzzPhase,
-    Instance, Light, LightKind, Material, Primitive, Scene, Skin, SkinProfile, Source, TextureRef,
-    VertexCurvature, Wrap, json, tangent,
+    AlphaMode, Anisotropy, Camera, DiffuseTransmission, Error, FUZZ_EXTENSION, Fuzz, FuzzAttenuation,
+    FuzzLayer, FuzzPhase, Instance, Light, LightKind, Material, Primitive, Scene, Skin, SkinProfile, Source,
+    TextureRef, VertexCurvature, Wrap, json, tangent,
 };
 
 /// Extensions that may stand in `extensionsRequired`: those this module reads, and those that change how
@@ -49,8 +49,9 @@ const ADMITTED_EXTENSIONS: [&str; 25] = [
 ];
 
 /// Material extensions that [`Material`] represents.
-const READ_MATERIAL_EXTENSIONS: [&str; 5] = [
+const READ_MATERIAL_EXTENSIONS: [&str; 6] = [
     "KHR_materials_anisotropy",
+    "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
     "KHR_materials_sheen",
     "KINRAN_materials_fuzz",
@@ -244,6 +245,25 @@ impl Loader<'_> {
             }),
             None => None,
         };
+        let diffuse_transmission: Option<json::DiffuseTransmission> =
+            self.extension(&material.extensions, "KHR_materials_diffuse_transmission", &what)?;
+        let diffuse_transmission = match diffuse_transmission {
+            Some(d) => {
+                let what = |field| format!("{what}: {field}");
+                let color = d.diffuse_transmission_color_factor;
+                Some(DiffuseTransmission {
+                    factor: self.unit(d.diffuse_transmission_factor, &what("diffuseTransmissionFactor"))?,
+                    texture: self
+                        .texture(&d.diffuse_transmission_texture, &what("diffuseTransmissionTexture"))?,
+                    color_factor: self.finite(color, &what("diffuseTransmissionColorFactor"))?.into(),
+                    color: self.texture(
+                        &d.diffuse_transmission_color_texture,
+                        &what("diffuseTransmissionColorTexture"),
+                    )?,
+                })
+            }
+            None => None,
+        };
         let strength: Option<json::EmissiveStrength> =
             self.extension(&material.extensions, "KHR_materials_emissive_strength", &what)?;
         let strength = strength.map_or(1.0, |extension| extension.emissive_strength);
@@ -279,6 +299,7 @@ impl Loader<'_> {
             anisotropy,
             skin: self.skin(&material.extensions, &what)?,
             fuzz: self.fuzz(material, &what)?,
+            diffuse_transmission,
             alpha_mode: match material.alpha_mode {
                 json::AlphaMode::Opaque => AlphaMode::Opaque,
                 json::AlphaMode::Mask => AlphaMode::Mask {

@@ -105,6 +105,20 @@ pub struct Source {
     pub lacks_tangents: bool,
 }
 
+/// `KHR_materials_diffuse_transmission`: of the light that a thin surface scatters, the share that comes out on its
+/// other side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiffuseTransmission {
+    /// The share, 0 to 1, multiplied with the texture's alpha.
+    pub factor: f32,
+    /// A share.
+    pub texture: Option<TextureRef>,
+    /// Linear colour of what comes out, multiplied with the texture.
+    pub color_factor: Vec3,
+    /// sRGB colour.
+    pub color: Option<TextureRef>,
+}
+
 /// What happens where a surface's alpha is below one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AlphaMode {
@@ -152,6 +166,8 @@ pub struct Material {
     pub skin: Option<Skin>,
     /// `KINRAN_materials_fuzz`, or `KHR_materials_sheen` as upright fibres.
     pub fuzz: Option<Fuzz>,
+    /// `KHR_materials_diffuse_transmission`, when present.
+    pub diffuse_transmission: Option<DiffuseTransmission>,
     /// Transparency.
     pub alpha_mode: AlphaMode,
     /// Both sides are lit; otherwise back faces are culled.
@@ -164,6 +180,7 @@ impl Material {
     /// Every texture of the material; the normal map first, then the anisotropy map, for the first one
     /// tells which UV set generated tangents follow.
     pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
+        let diffuse_transmission = self.diffuse_transmission.as_ref();
         [
             self.normal.as_ref(),
             self.anisotropy.as_ref().and_then(|anisotropy| anisotropy.texture.as_ref()),
@@ -171,6 +188,8 @@ impl Material {
             self.metallic_roughness.as_ref(),
             self.occlusion.as_ref(),
             self.emissive.as_ref(),
+            diffuse_transmission.and_then(|d| d.texture.as_ref()),
+            diffuse_transmission.and_then(|d| d.color.as_ref()),
         ]
         .into_iter()
         .flatten()

@@ -62,6 +62,7 @@ fn everything() -> (Value, Vec<u8>) {
             "emissiveFactor": [0.5, 0, 0],
             "extensions": {
                 "KHR_materials_anisotropy": { "anisotropyStrength": 0.6, "anisotropyRotation": 1.57, "anisotropyTexture": { "index": 0 } },
+                "KHR_materials_diffuse_transmission": { "diffuseTransmissionFactor": 0.25, "diffuseTransmissionTexture": { "index": 0 } },
                 "KHR_materials_emissive_strength": { "emissiveStrength": 4 },
                 "KHR_materials_clearcoat": {},
             },
@@ -162,6 +163,9 @@ fn everything_arrives_where_it_belongs() {
     let anisotropy = material.anisotropy.as_ref().unwrap();
     assert_eq!((anisotropy.strength, anisotropy.rotation), (0.6, 1.57));
     assert!(anisotropy.texture.is_some());
+    let through = material.diffuse_transmission.as_ref().unwrap();
+    assert_eq!((through.factor, through.color_factor), (0.25, Vec3::ONE));
+    assert!(through.texture.is_some() && through.color.is_none());
     let image = scene.images[0].as_ref().unwrap();
     assert_eq!(image.pixels, kinran_image::Pixels::U8((0..12).collect()));
 

@@ -1,4 +1,5 @@
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -6,10 +7,14 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// Work shorter than this shows no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
 
+/// Is told what is being done, and which share of it is.
+type Watch = Arc<dyn Fn(&str, f32) + Send + Sync>;
+
 /// Makes the progress bars of a command.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Default)]
 pub struct Progress {
     visible: bool,
+    watch: Option<Watch>,
 }
 
 /// One bar on standard error, gone when dropped.
@@ -17,12 +22,20 @@ pub struct Stage {
     bar: ProgressBar,
     started: Instant,
     hidden: AtomicBool,
+    total: u64,
+    done: AtomicU64,
+    watch: Option<Watch>,
 }
 
 impl Progress {
     /// Bars that show on a terminal, or never.
     pub fn new(visible: bool) -> Self {
-        Progress { visible }
+        Progress { visible, watch: None }
+    }
+
+    /// No bars; `watch` is told instead, from any thread and often.
+    pub fn watched(watch: impl Fn(&str, f32) + Send + Sync + 'static) -> Self {
+        Progress { visible: false, watch: Some(Arc::new(watch)) }
     }
 
     /// A bar for `total` units of work called `name`, which shows once it has taken longer than a second.
@@ -32,7 +45,14 @@ impl Progress {
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden())
             .with_style(style)
             .with_message(name.into());
-        Stage { bar, started: Instant::now(), hidden: AtomicBool::new(self.visible) }
+        Stage {
+            bar,
+            started: Instant::now(),
+            hidden: AtomicBool::new(self.visible),
+            total: total.max(1),
+            done: AtomicU64::new(0),
+            watch: self.watch.clone(),
+        }
     }
 }
 
@@ -43,6 +63,10 @@ impl Stage {
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }
         self.bar.inc(units);
+        let done = self.done.fetch_add(units, Ordering::Relaxed) + units;
+        if let Some(watch) = &self.watch {
+            watch(&self.bar.message(), done as f32 / self.total as f32);
+        }
     }
 }
 

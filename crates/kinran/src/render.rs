@@ -11,7 +11,7 @@ use crate::skin::missing_curvature;
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::values::filter;
 use crate::view::{View, ViewArgs, file_name};
-use crate::{Console, Error, Progress, outputs};
+use crate::{Console, Error, outputs};
 
 /// Renders a glTF file
 ///
@@ -119,7 +119,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let prepared = view.scene(&scene, surfaces)?;
     let film = match args.backend {
         Backend::Cpu => view.render(&prepared, "render", args.spp, filtering, &progress)?,
-        Backend::Gpu => gpu_film(&view, &prepared, args, &progress)?,
+        Backend::Gpu => gpu_film(&view, &prepared, filtering, args, console)?,
     };
     if outputs::has_extension(&args.output, "exr") {
         let pixels = Pixels::F32(film.pixels.into_flattened());
@@ -150,20 +150,32 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
 }
 
 #[cfg(feature = "gpu")]
-fn gpu_film(view: &View, scene: &RenderScene, args: &Args, progress: &Progress) -> Result<Film, Error> {
-    use kinran_render::realtime::{Gpu, Realtime, Settings, ShaderSource};
+fn gpu_film(
+    view: &View,
+    scene: &RenderScene,
+    filtering: TextureFiltering,
+    args: &Args,
+    console: &Console,
+) -> Result<Film, Error> {
+    use kinran_render::realtime::{Gpu, Realtime, Settings, ShaderSource, left_out};
+    let settings = Settings {
+        shadows: view.shadows,
+        reflections: view.env_samples > 0,
+        background: view.background,
+        ..Settings::default()
+    };
+    left_out(scene, &settings).iter().for_each(|what| console.warn(format!("--backend gpu: {what}")));
     let gpu = Gpu::open()?;
     let source = ShaderSource { folder: args.shaders.clone() };
     // Nothing is shown on a display, so any format will do.
     let renderer = Realtime::new(&gpu, &source, wgpu::TextureFormat::Rgba8Unorm)?;
-    let scene = renderer.load(scene, &renderer.light_of(scene));
-    let settings = Settings { shadows: view.shadows, background: view.background, ..Settings::default() };
-    let stage = progress.stage("render", u64::from(args.spp));
+    let scene = renderer.load(scene, &renderer.light_of(scene), filtering);
+    let stage = console.progress().stage("render", u64::from(args.spp));
     Ok(renderer.film(&scene, &view.camera, &settings, view.size, args.spp, &|_, _| stage.add(1))?)
 }
 
 #[cfg(not(feature = "gpu"))]
-fn gpu_film(_: &View, _: &RenderScene, _: &Args, _: &Progress) -> Result<Film, Error> {
+fn gpu_film(_: &View, _: &RenderScene, _: TextureFiltering, _: &Args, _: &Console) -> Result<Film, Error> {
     Err(Error::Internal("a build without a GPU renderer was asked for one".into()))
 }
 

@@ -11,11 +11,13 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 use eframe::egui;
-use kinran_render::realtime::wanted_features;
+use kinran_render::realtime::{ShaderSource, wanted_features};
+use serde::Serialize;
 
+use crate::values::size;
 use crate::view::ViewArgs;
 use crate::{Console, Error};
-use app::App;
+use app::{App, Outcome};
 use parameters::Parameters;
 
 /// Opens a window on a glTF file
@@ -43,6 +45,10 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     pub shaders: Option<PathBuf>,
 
+    /// The window's size in points, WIDTHxHEIGHT
+    #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = size)]
+    pub window: (u32, u32),
+
     /// Saves a picture of the window as .png once it is drawn smoothly, then closes it
     #[arg(long, value_name = "PNG")]
     pub screenshot: Option<PathBuf>,
@@ -56,7 +62,7 @@ pub struct Args {
 ///
 /// # Errors
 /// [`Error::Usage`] where no window can be opened; those of the files named.
-pub fn run(args: &Args, _: &Console) -> Result<(), Error> {
+pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if let Some(path) = &args.screenshot {
         crate::outputs::check_file(path, &["png"])?;
     }
@@ -67,10 +73,12 @@ pub fn run(args: &Args, _: &Console) -> Result<(), Error> {
     };
     if let Some(folder) = &args.shaders {
         loader::fill_shader_folder(folder)?;
+        ShaderSource { folder: Some(folder.clone()) }.check()?;
     }
+    let size = [args.window.0 as f32, args.window.1 as f32];
 
     let mut options = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default().with_inner_size([1280.0, 800.0]).with_title("Kinran"),
+        viewport: egui::ViewportBuilder::default().with_inner_size(size).with_title("Kinran"),
         renderer: eframe::Renderer::Wgpu,
         ..Default::default()
     };
@@ -83,8 +91,8 @@ pub fn run(args: &Args, _: &Console) -> Result<(), Error> {
         });
     }
     // What goes wrong inside comes out here, since the window's loop returns only its own errors.
-    let failure = Arc::new(Mutex::new(None));
-    let inside = failure.clone();
+    let outcome = Arc::new(Mutex::new(Outcome::default()));
+    let inside = outcome.clone();
     let settings = app::Start {
         file,
         view: args.view.clone(),
@@ -97,12 +105,25 @@ pub fn run(args: &Args, _: &Console) -> Result<(), Error> {
         options,
         Box::new(move |context| Ok(Box::new(App::new(context, settings, inside)?))),
     );
-    if let Some(error) = failure.lock().ok().and_then(|mut failure| failure.take()) {
+    let outcome = std::mem::take(&mut *outcome.lock().expect("no thread panics"));
+    if let Some(error) = outcome.failure {
         return Err(error);
     }
     created.map_err(|e| {
         let fix = "a window needs a display and a Vulkan driver (in Debian, mesa-vulkan-drivers); without them use \
                    `kinran render`";
         Error::Usage(format!("no window can be opened: {e}; {fix}"))
-    })
+    })?;
+    let Some(path) = &args.screenshot else { return Ok(()) };
+    let seconds = outcome.first_picture.unwrap_or_default().as_secs_f64();
+    let summary = Summary { screenshot: path.to_string_lossy().into_owned(), first_picture_seconds: seconds };
+    console
+        .result(&summary, &format!("{}: the first picture came {seconds:.2} s after reading", path.display()))
+}
+
+#[derive(Serialize)]
+struct Summary {
+    screenshot: String,
+    /// From the model's being read to its first picture.
+    first_picture_seconds: f64,
 }

@@ -67,7 +67,7 @@ mod realtime {
     use kinran::surfaces::fuzz_coefficients;
     use kinran_render::metrics::flip;
     use kinran_render::realtime::{Gpu, Realtime, Settings as GpuSettings, ShaderSource};
-    use kinran_render::reference::{Background, RenderScene, Settings, look_at, render};
+    use kinran_render::reference::{Background, RenderScene, Settings, TextureFiltering, look_at, render};
     use kinran_render::tonemap::{Tonemap, to_srgb8};
     use kinran_scene::{
         Environment, Fuzz, FuzzAttenuation, FuzzLayer, FuzzPhase, Instance, Light, LightKind, Scene,
@@ -146,7 +146,8 @@ mod realtime {
         };
         let wanted = render(scene, &camera, &settings, &|_, _| {}).unwrap();
         let settings = GpuSettings { shadows: false, background, ..GpuSettings::default() };
-        let loaded = renderer.load(scene, &renderer.light_of(scene));
+        let loaded =
+            renderer.load(scene, &renderer.light_of(scene), TextureFiltering::Mips { max_anisotropy: 16 });
         let got = renderer.film(&loaded, &camera, &settings, (SIZE, SIZE), 16, &|_, _| {}).unwrap();
         let shown = |pixels: &[[f32; 3]]| to_srgb8(pixels, 0.0, Tonemap::Aces);
         flip(&shown(&wanted.pixels), &shown(&got.pixels), SIZE, SIZE).unwrap().mean

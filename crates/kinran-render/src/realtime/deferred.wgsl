@@ -34,6 +34,8 @@ fn light(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     surface.base_color = base.rgb;
     surface.metallic = factors.g;
     surface.occlusion = factors.b;
+    surface.translucency = select(0.0, factors.a, base.a >= 0.5);
+    surface.translucent_color = base.rgb;
     surface.opacity = 1.0;
 
     let view = normalize(frame.camera.xyz - surface.position);
@@ -48,12 +50,15 @@ fn light(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
             dot(surface.bitangent, incoming.direction),
             dot(surface.normal, incoming.direction),
         );
+        if u.z <= 0.0 {
+            sum += from_behind(surface, lobe, light, incoming, u.z);
+        }
         if u.z <= -FUZZ_WRAP || (u.z <= 0.0 && surface.fuzz.kind == FUZZ_NONE) {
             continue;
         }
         var visible = 1.0;
         if light.color.w > 0.5 {
-            visible = shadow(surface, incoming.direction);
+            visible = shadow(surface.position, surface.geometric_normal, incoming.direction);
         }
         let reflected = (lobe.diffuse / PI + specular_isotropic(surface, lobe, u)) * u.z;
         let lit = select(vec3f(0.0), reflected, u.z > 0.0);

@@ -11,9 +11,9 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
 }
 
-/// What is used where the device has it: block-compressed textures.
+/// What is used where the device has it: block-compressed textures, and a clock for passes.
 pub fn wanted_features(adapter: &wgpu::Adapter) -> wgpu::Features {
-    adapter.features() & wgpu::Features::TEXTURE_COMPRESSION_BC
+    adapter.features() & (wgpu::Features::TEXTURE_COMPRESSION_BC | wgpu::Features::TIMESTAMP_QUERY)
 }
 
 impl Gpu {

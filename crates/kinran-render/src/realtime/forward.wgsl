@@ -22,7 +22,7 @@ fn lit(surface: Surface, lobe: Lobe, skin: Skin) -> vec3f {
             let turned_away = dot(surface.geometric_normal, incoming.direction) <= 0.0;
             var passed = 1.0;
             if light.color.w > 0.5 && !turned_away {
-                passed = shadow(surface, incoming.direction);
+                passed = shadow(surface.position, surface.geometric_normal, incoming.direction);
             }
             var reflected = lobe.diffuse / PI * skin_punctual(skin, incoming.direction, turned_away);
             if u.z > 0.0 && !turned_away {
@@ -31,12 +31,15 @@ fn lit(surface: Surface, lobe: Lobe, skin: Skin) -> vec3f {
             sum += reflected * incoming.irradiance * passed;
             continue;
         }
+        if u.z <= 0.0 {
+            sum += from_behind(surface, lobe, light, incoming, u.z);
+        }
         if u.z <= 0.0 && surface.fuzz.kind == FUZZ_NONE {
             continue;
         }
         var visible = 1.0;
         if light.color.w > 0.5 {
-            visible = shadow(surface, incoming.direction);
+            visible = shadow(surface.position, surface.geometric_normal, incoming.direction);
         }
         let base = (lobe.diffuse / PI + specular_anisotropic(surface, lobe, u)) * u.z;
         let lit = select(vec3f(0.0), base, u.z > 0.0);

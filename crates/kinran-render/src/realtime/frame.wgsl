@@ -19,6 +19,7 @@ struct Frame {
     inverse_view_projection: mat4x4f,
     // World to the shadow map's clip space.
     light_projection: mat4x4f,
+    // xyz position, w: 0 when the environment is not reflected.
     camera: vec4f,
     // rgb, w: 1 when the environment is seen instead.
     background: vec4f,

@@ -14,13 +14,13 @@ struct FuzzMaterial {
     transforms: array<vec4f, 6>,
 }
 
-@group(1) @binding(13) var<uniform> fuzz_material: FuzzMaterial;
-@group(1) @binding(14) var fuzz_direction_map: texture_2d<f32>;
-@group(1) @binding(15) var fuzz_color_map: texture_2d<f32>;
-@group(1) @binding(16) var fuzz_amount_map: texture_2d<f32>;
-@group(1) @binding(17) var fuzz_direction_sampler: sampler;
-@group(1) @binding(18) var fuzz_color_sampler: sampler;
-@group(1) @binding(19) var fuzz_amount_sampler: sampler;
+@group(1) @binding(17) var<uniform> fuzz_material: FuzzMaterial;
+@group(1) @binding(18) var fuzz_direction_map: texture_2d<f32>;
+@group(1) @binding(19) var fuzz_color_map: texture_2d<f32>;
+@group(1) @binding(20) var fuzz_amount_map: texture_2d<f32>;
+@group(1) @binding(21) var fuzz_direction_sampler: sampler;
+@group(1) @binding(22) var fuzz_color_sampler: sampler;
+@group(1) @binding(23) var fuzz_amount_sampler: sampler;
 
 fn fuzz_uv(in: Varying, texture: u32) -> vec2f {
     let row = fuzz_material.transforms[2u * texture];

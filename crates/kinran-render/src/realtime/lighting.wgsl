@@ -18,6 +18,9 @@ struct Surface {
     metallic: f32,
     // 0 opaque, 1: what is not reflected passes through.
     transmissive: f32,
+    // Share of the scattered light that comes out on the other side, and its colour.
+    translucency: f32,
+    translucent_color: vec3f,
     occlusion: f32,
     emitted: vec3f,
     opacity: f32,
@@ -33,6 +36,8 @@ struct Lobe {
     // Directional albedo of the specular lobe.
     albedo: vec3f,
     diffuse: vec3f,
+    // Albedo of the Lambert lobe for light from behind.
+    translucent: vec3f,
     transmitted: vec3f,
 }
 
@@ -54,14 +59,16 @@ fn lobe_of(surface: Surface, view: vec3f) -> Lobe {
 
     let dielectric = (DIELECTRIC * (white - grazing) + grazing)
         * multiscatter_compensation(vec3f(DIELECTRIC), v.z, surface.alpha_t, surface.alpha_b).x;
-    let passed = surface.base_color * (1.0 - surface.metallic) * (1.0 - min(dielectric, 1.0));
+    let inside = (1.0 - surface.metallic) * (1.0 - min(dielectric, 1.0));
+    let scattered = inside * (1.0 - surface.transmissive);
     return Lobe(
         v,
         base_reflectance,
         compensation,
         min(single * compensation, vec3f(1.0)),
-        passed * (1.0 - surface.transmissive),
-        passed * surface.transmissive,
+        surface.base_color * scattered * (1.0 - surface.translucency),
+        surface.translucent_color * scattered * surface.translucency,
+        surface.base_color * inside * surface.transmissive,
     );
 }
 
@@ -85,15 +92,17 @@ fn incident(light: Light, position: vec3f) -> Incident {
     return Incident(direction, light.color.rgb * (falloff * window / distance_sqr));
 }
 
-// The share of the shadowed light that reaches a point, by percentage-closer filtering over 3 × 3 texels, each of them
-// filtered bilinearly.
-fn shadow(surface: Surface, direction: vec3f) -> f32 {
+// The share of the shadowed light that reaches a point on the side of its surface that `normal` points to, by
+// percentage-closer filtering over 3 × 3 texels, each of them filtered bilinearly.
+fn shadow(position: vec3f, normal: vec3f, direction: vec3f) -> f32 {
     let size = f32(textureDimensions(shadow_map).x);
-    // A texel and a half off the surface along its normal, more where light grazes.
-    let texel = 2.0 / (size * length(frame.light_projection[0].xyz));
-    let slope = 1.0 - abs(dot(surface.geometric_normal, direction));
-    let lifted = surface.position + surface.geometric_normal * (texel * (0.5 + 1.5 * slope));
-    let clip = frame.light_projection * vec4f(lifted, 1.0);
+    // Lifted along the normal by what the plane of the surface rises over the filter's reach, two texels along both
+    // axes, and half a texel for rounding: a surface in plain light is not its own shadow.
+    let m = frame.light_projection;
+    let texel = 2.0 / (size * length(vec3f(m[0].x, m[1].x, m[2].x)));
+    let cosine = dot(normal, direction);
+    let lift = texel * (0.5 + 2.8284 * sqrt(saturate(1.0 - cosine * cosine)));
+    let clip = m * vec4f(position + normal * lift, 1.0);
     let uv = clip.xy * vec2f(0.5, -0.5) + 0.5;
     var lit = 0.0;
     for (var i = -1; i <= 1; i++) {
@@ -104,6 +113,18 @@ fn shadow(surface: Surface, direction: vec3f) -> f32 {
     }
     let outside = any(abs(clip.xy) > vec2f(1.0));
     return select(lit / 9.0, 1.0, outside);
+}
+
+// What comes through of a light from behind; `n_u` is the cosine between normal and light, not above zero.
+fn from_behind(surface: Surface, lobe: Lobe, light: Light, incoming: Incident, n_u: f32) -> vec3f {
+    if all(lobe.translucent == vec3f(0.0)) {
+        return vec3f(0.0);
+    }
+    var visible = 1.0;
+    if light.color.w > 0.5 {
+        visible = shadow(surface.position, -surface.geometric_normal, incoming.direction);
+    }
+    return lobe.translucent / PI * incoming.irradiance * (-n_u * visible);
 }
 
 // Specular lobe times nothing: per steradian, without the cosine. `u` lies above the horizon.
@@ -133,7 +154,13 @@ fn ambient(surface: Surface, lobe: Lobe, taps: u32) -> vec3f {
     for (var i = 0; i < 9; i++) {
         coefficients[i] = frame.irradiance[i].rgb;
     }
-    let diffuse = lobe.diffuse / PI * max(sh_evaluate(coefficients, surface.normal), vec3f(0.0));
+    var diffuse = lobe.diffuse / PI * max(sh_evaluate(coefficients, surface.normal), vec3f(0.0));
+    if any(lobe.translucent > vec3f(0.0)) {
+        diffuse += lobe.translucent / PI * max(sh_evaluate(coefficients, -surface.normal), vec3f(0.0));
+    }
+    if frame.camera.w == 0.0 {
+        return surface.occlusion * diffuse;
+    }
 
     // 0 where the lobe is round, towards 1 where it is a line.
     let ratio = surface.alpha_b / surface.alpha_t;

@@ -10,6 +10,7 @@ mod fuzz;
 mod probe;
 mod shaders;
 mod target;
+mod timer;
 mod upload;
 
 use glam::camera::rh;
@@ -18,12 +19,14 @@ use kinran_scene::{Camera, LightKind};
 
 use crate::Error;
 use crate::reference::sampler::sample_2d;
-use crate::reference::{Background, Film, RenderScene};
+use crate::reference::{Background, Film, RenderScene, TextureFiltering};
 use crate::tonemap::Tonemap;
 
 pub use device::{Gpu, wanted_features};
 pub use shaders::ShaderSource;
 pub use target::Target;
+pub use timer::PassTime;
+use timer::Timer;
 pub use upload::{Adjustment, GpuLight, GpuScene};
 use upload::{Path, VERTEX_FLOATS};
 
@@ -68,6 +71,8 @@ pub enum Channel {
 pub struct Settings {
     /// The first directional light casts shadows.
     pub shadows: bool,
+    /// The environment is reflected; otherwise it only lights what scatters.
+    pub reflections: bool,
     /// Behind everything. The environment is shown sharp: `blur` is not followed.
     pub background: Background,
     /// What is shown.
@@ -84,6 +89,7 @@ impl Default for Settings {
     fn default() -> Self {
         Settings {
             shadows: true,
+            reflections: true,
             background: Background::Environment { blur: 0.0 },
             channel: Channel::Lit,
             exposure: 0.0,
@@ -106,6 +112,7 @@ pub(crate) struct Layouts {
 /// Pipelines of every pass; opaque ones for single-sided and double-sided materials.
 struct Pipelines {
     shadow: wgpu::RenderPipeline,
+    cutout: wgpu::RenderPipeline,
     fill: [wgpu::RenderPipeline; 2],
     light: wgpu::RenderPipeline,
     opaque: [wgpu::RenderPipeline; 2],
@@ -192,21 +199,49 @@ impl Realtime {
     }
 
     /// Brings a scene to the device, lit by what [`Realtime::light_of`] made of it or of another with the same
-    /// surroundings.
-    pub fn load(&self, scene: &RenderScene, light: &GpuLight) -> GpuScene {
-        GpuScene::new(&self.gpu, &self.layouts, scene, light)
+    /// surroundings. Textures are read as `filtering` says, by the device's own samplers.
+    pub fn load(&self, scene: &RenderScene, light: &GpuLight, filtering: TextureFiltering) -> GpuScene {
+        GpuScene::new(&self.gpu, &self.layouts, scene, light, filtering)
     }
 
     /// Adds a frame to `target`. Frames differ in where in the pixel they look.
     pub fn draw(&self, scene: &GpuScene, camera: &Camera, settings: &Settings, target: &mut Target) {
+        self.draw_timed(scene, camera, settings, target, None);
+    }
+
+    /// [`draw`](Realtime::draw)s a frame and says how long each of its passes took, in their order; those that had
+    /// nothing to do are missing. Waits for the device.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] where the device has no clock or does not give the times back.
+    pub fn pass_times(
+        &self,
+        scene: &GpuScene,
+        camera: &Camera,
+        settings: &Settings,
+        target: &mut Target,
+    ) -> Result<Vec<PassTime>, Error> {
+        let timer = Timer::new(&self.gpu)?;
+        self.draw_timed(scene, camera, settings, target, Some(&timer));
+        timer.read(&self.gpu)
+    }
+
+    fn draw_timed(
+        &self,
+        scene: &GpuScene,
+        camera: &Camera,
+        settings: &Settings,
+        target: &mut Target,
+        timer: Option<&Timer>,
+    ) {
         let jitter = sample_2d(target.frames, 0, 0);
         let floats = self.frame_floats(scene, camera, settings, target, jitter);
         self.gpu.queue.write_buffer(&self.frame, 0, &upload::bytes(&floats));
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
 
         let frame = self.frame_group(scene);
-        if target.frames == 0 {
-            self.draw_shadows(&mut encoder, scene);
+        if target.frames == 0 && has_sun(&scene.scene, settings) {
+            self.draw_shadows(&mut encoder, scene, timer);
         }
         let path = |draw: &&upload::Draw| match scene.materials[draw.material].path {
             Path::Forward if settings.all_deferred && settings.channel == Channel::Lit => Path::Deferred,
@@ -215,11 +250,14 @@ impl Realtime {
             path => path,
         };
         let draws = |wanted| scene.draws.iter().filter(move |draw| path(draw) == wanted);
-        self.fill(&mut encoder, &frame, scene, target, draws(Path::Deferred));
-        self.light(&mut encoder, &frame, target);
+        let deferred = draws(Path::Deferred).next().is_some();
+        if deferred {
+            self.fill(&mut encoder, &frame, scene, target, draws(Path::Deferred), timer);
+            self.light(&mut encoder, &frame, target, timer);
+        }
 
         // Opaque first, then the sky behind it, then what lets both through, the farthest first.
-        let mut pass = target.hdr_pass(&mut encoder);
+        let mut pass = target.hdr_pass(&mut encoder, deferred, timer);
         pass.set_bind_group(0, &frame, &[]);
         pass.set_vertex_buffer(0, scene.vertices.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
@@ -247,7 +285,8 @@ impl Realtime {
         // Into the sum of all frames.
         let [before, after] = target.sums();
         let group = self.group(&self.layouts.accumulate, &[before, target.hdr()]);
-        let mut pass = color_pass(&mut encoder, after, wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT));
+        let timer = timer.map(|timer| timer.pass("accumulate"));
+        let mut pass = color_pass(&mut encoder, after, wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), timer);
         pass.set_pipeline(&self.pipelines.accumulate);
         pass.set_bind_group(0, &frame, &[]);
         pass.set_bind_group(1, &group, &[]);
@@ -261,7 +300,7 @@ impl Realtime {
     pub fn show(&self, target: &Target, view: &wgpu::TextureView, scene: &GpuScene) {
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let group = self.group(&self.layouts.show, &[target.sums()[0]]);
-        let mut pass = color_pass(&mut encoder, view, wgpu::LoadOp::Clear(wgpu::Color::BLACK));
+        let mut pass = color_pass(&mut encoder, view, wgpu::LoadOp::Clear(wgpu::Color::BLACK), None);
         pass.set_pipeline(&self.pipelines.show);
         pass.set_bind_group(0, &self.frame_group(scene), &[]);
         pass.set_bind_group(1, &group, &[]);
@@ -302,6 +341,11 @@ impl Realtime {
         let mut target = Target::new(self, size);
         for frame in 0..samples {
             self.draw(scene, camera, settings, &mut target);
+            // The device is kept busy, but not loaded with more than it can hold.
+            if frame % 8 == 7 {
+                let waited = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+                waited.map_err(|e| Error::Gpu(format!("the device does not draw any more: {e}")))?;
+            }
             progress(frame as usize + 1, samples as usize);
         }
         target.film(&self.gpu)
@@ -332,8 +376,7 @@ impl Realtime {
         let view_projection = projection * Mat4::from(camera.transform).inverse();
 
         // The shadow map sees the whole model.
-        let directional = |light: &&kinran_scene::Light| light.kind == LightKind::Directional;
-        let sun = scene.lights.iter().find(directional).filter(|_| settings.shadows);
+        let sun = sun(scene).filter(|_| settings.shadows);
         let light_projection = sun.map_or(Mat4::IDENTITY, |sun| {
             let up = if sun.direction.y.abs() > 0.99 { Vec3::X } else { Vec3::Y };
             let view = rh::view::look_to_mat4(middle - radius * sun.direction, sun.direction, up);
@@ -344,7 +387,7 @@ impl Realtime {
         for matrix in [view_projection, view_projection.inverse(), light_projection] {
             floats.extend(matrix.to_cols_array());
         }
-        floats.extend(eye.extend(1.0).to_array());
+        floats.extend(eye.extend(f32::from(u8::from(settings.reflections))).to_array());
         let background = match settings.background {
             Background::Color(color) => color.extend(0.0),
             Background::Environment { .. } => Vec4::W,
@@ -418,7 +461,7 @@ impl Realtime {
         })
     }
 
-    fn draw_shadows(&self, encoder: &mut wgpu::CommandEncoder, scene: &GpuScene) {
+    fn draw_shadows(&self, encoder: &mut wgpu::CommandEncoder, scene: &GpuScene, timer: Option<&Timer>) {
         let group = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &self.layouts.shadow,
@@ -427,13 +470,20 @@ impl Realtime {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("shadow"),
             depth_stencil_attachment: Some(depth_attachment(&self.shadow_map, wgpu::LoadOp::Clear(1.0))),
+            timestamp_writes: timer.map(|timer| timer.pass("shadow")),
             ..Default::default()
         });
-        pass.set_pipeline(&self.pipelines.shadow);
         pass.set_bind_group(0, &group, &[]);
         pass.set_vertex_buffer(0, scene.vertices.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
         for draw in scene.draws.iter().filter(|draw| scene.materials[draw.material].path != Path::Blended) {
+            let material = &scene.materials[draw.material];
+            if material.cutout {
+                pass.set_pipeline(&self.pipelines.cutout);
+                pass.set_bind_group(1, &material.bind_group, &[]);
+            } else {
+                pass.set_pipeline(&self.pipelines.shadow);
+            }
             pass.draw_indexed(draw.indices.clone(), 0, 0..1);
         }
     }
@@ -445,8 +495,9 @@ impl Realtime {
         scene: &GpuScene,
         target: &Target,
         draws: impl Iterator<Item = &'a upload::Draw>,
+        timer: Option<&Timer>,
     ) {
-        let mut pass = target.fill_pass(encoder);
+        let mut pass = target.fill_pass(encoder, timer);
         pass.set_bind_group(0, frame, &[]);
         pass.set_vertex_buffer(0, scene.vertices.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
@@ -458,15 +509,50 @@ impl Realtime {
         }
     }
 
-    fn light(&self, encoder: &mut wgpu::CommandEncoder, frame: &wgpu::BindGroup, target: &Target) {
+    fn light(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        frame: &wgpu::BindGroup,
+        target: &Target,
+        timer: Option<&Timer>,
+    ) {
         let [base, normal, factors] = target.g_buffer();
         let group = self.group(&self.layouts.g_buffer, &[base, normal, factors, target.depth()]);
-        let mut pass = color_pass(encoder, target.hdr(), wgpu::LoadOp::Load);
+        let timer = timer.map(|timer| timer.pass("light"));
+        let mut pass = color_pass(encoder, target.hdr(), wgpu::LoadOp::Load, timer);
         pass.set_pipeline(&self.pipelines.light);
         pass.set_bind_group(0, frame, &[]);
         pass.set_bind_group(1, &group, &[]);
         pass.draw(0..3, 0..1);
     }
+}
+
+/// The light whose shadows are drawn.
+fn sun(scene: &RenderScene) -> Option<&kinran_scene::Light> {
+    scene.lights.iter().take(MAX_LIGHTS).find(|light| light.kind == LightKind::Directional)
+}
+
+fn has_sun(scene: &RenderScene, settings: &Settings) -> bool {
+    settings.shadows && sun(scene).is_some()
+}
+
+/// What this renderer leaves out of a scene that the reference draws, a sentence each.
+pub fn left_out(scene: &RenderScene, settings: &Settings) -> Vec<String> {
+    let lights = scene.lights.len();
+    let mut sentences = Vec::new();
+    if lights > MAX_LIGHTS {
+        sentences.push(format!("only the first {MAX_LIGHTS} of {lights} lights shine"));
+    }
+    let shadowless = lights.min(MAX_LIGHTS) - usize::from(sun(scene).is_some());
+    if settings.shadows && shadowless > 0 {
+        sentences.push(format!(
+            "{shadowless} of {lights} lights cast no shadows: the first directional light alone has a shadow map"
+        ));
+    }
+    if matches!(settings.background, Background::Environment { blur } if blur > 0.0) {
+        sentences.push("the environment is seen sharp, not blurred".into());
+    }
+    sentences
 }
 
 fn depth_attachment(
@@ -492,9 +578,11 @@ fn color_pass<'a>(
     encoder: &'a mut wgpu::CommandEncoder,
     view: &wgpu::TextureView,
     load: wgpu::LoadOp<wgpu::Color>,
+    timestamp_writes: Option<wgpu::RenderPassTimestampWrites>,
 ) -> wgpu::RenderPass<'a> {
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         color_attachments: &[color_attachment(view, load)],
+        timestamp_writes,
         ..Default::default()
     })
 }
@@ -527,8 +615,8 @@ impl Layouts {
             (texture(T::Float { filterable: true }), texture(T::Float { filterable: false }));
         let smooth = BindingType::Sampler(S::Filtering);
         let mut material = vec![uniform];
-        material.extend([filtered; 6]);
-        material.extend([smooth; 6]);
+        material.extend([filtered; upload::SLOTS]);
+        material.extend([smooth; upload::SLOTS]);
         material.push(uniform);
         material.extend([filtered; 3]);
         material.extend([smooth; 3]);
@@ -576,6 +664,7 @@ impl Pipelines {
         shown: wgpu::TextureFormat,
     ) -> Result<Self, Error> {
         use wgpu::CompareFunction::{Less, LessEqual};
+        source.check()?;
         let mesh = [
             "frame.wgsl",
             "fuzz.wgsl",
@@ -596,6 +685,8 @@ impl Pipelines {
             "gbuffer.wgsl",
         ];
         let light_files = ["frame.wgsl", "fuzz.wgsl", "lighting.wgsl", "octahedral.wgsl", "deferred.wgsl"];
+        let cutout =
+            ["frame.wgsl", "fuzz.wgsl", "lighting.wgsl", "surface.wgsl", "fuzz_surface.wgsl", "cutout.wgsl"];
         let material = [&layouts.frame, &layouts.material];
         let everywhere = Pass {
             files: &[],
@@ -646,6 +737,19 @@ impl Pipelines {
                     groups: &[&layouts.shadow],
                     vertex: "depth",
                     attributes: 1,
+                    depth: Some((Less, true)),
+                    ..everywhere
+                },
+            )?,
+            cutout: pipeline(
+                device,
+                source,
+                &Pass {
+                    files: &cutout,
+                    groups: &[&layouts.shadow, &layouts.material],
+                    vertex: "cutout_depth",
+                    attributes: 6,
+                    fragment: Some("cutout"),
                     depth: Some((Less, true)),
                     ..everywhere
                 },

@@ -11,18 +11,22 @@ use crate::reference::sampler::sample_2d;
 /// Levels; level l holds perceptual roughness `l / (LEVELS - 1)`.
 pub(super) const LEVELS: usize = 6;
 
-/// Rows of level 0, half its columns. Level 1, alpha 0.04, is 0.7 degrees a texel.
-pub(super) const HEIGHT: usize = 512;
+/// Rows of level 0, half its columns. At 512, level 1, alpha 0.04, is 0.7 degrees a texel; what is coarser itself is not
+/// filtered finer, down to half of that.
+pub(super) fn height(environment: &Environment) -> usize {
+    environment.height().clamp(256, 512)
+}
 
-/// Samples of the lobe for a texel, and as many of the environment.
-const SAMPLES: u32 = 64;
+/// Samples of the lobe for a texel of each level, and as many of the environment: the narrower the fewer.
+const SAMPLES: [u32; LEVELS] = [0, 24, 48, 64, 64, 64];
 
 /// Radiance of every texel of every level, level 0 first, row by row from the top, as an equirectangular image in the
 /// sense of [`Environment`]. Normal and view are taken to be the lobe's middle (Karis 2013).
 pub(super) fn prefilter(environment: &Environment) -> Vec<Vec<Vec3>> {
+    let rows = height(environment);
     (0..LEVELS)
         .map(|level| {
-            let (width, height) = (2 * HEIGHT >> level, HEIGHT >> level);
+            let (width, height) = ((2 * rows) >> level, rows >> level);
             let alpha = alpha_from_roughness(level as f32 / (LEVELS - 1) as f32);
             let texel = |i: usize| {
                 let place = vec2((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
@@ -30,7 +34,7 @@ pub(super) fn prefilter(environment: &Environment) -> Vec<Vec<Vec3>> {
                 if level == 0 {
                     environment.radiance(direction)
                 } else {
-                    filtered(environment, direction, alpha)
+                    filtered(environment, direction, alpha, SAMPLES[level])
                 }
             };
             (0..width * height).into_par_iter().map(texel).collect()
@@ -47,7 +51,7 @@ fn direction(uv: Vec2) -> Vec3 {
 
 /// The mean radiance in the lobe about `axis`, by visible normals and by the environment's own distribution, combined by
 /// the balance heuristic. Numerator and denominator share their samples.
-fn filtered(environment: &Environment, axis: Vec3, alpha: f32) -> Vec3 {
+fn filtered(environment: &Environment, axis: Vec3, alpha: f32, samples: u32) -> Vec3 {
     // m_n is worst at -z; a frame for the opposite hemisphere is its mirror image.
     let to_world =
         if axis.z >= 0.0 { m_n(axis) } else { m_n(-axis) * Mat3::from_diagonal(Vec3::new(1.0, -1.0, -1.0)) };
@@ -66,7 +70,7 @@ fn filtered(environment: &Environment, axis: Vec3, alpha: f32) -> Vec3 {
         radiance += weight * environment.radiance(world);
         weights += weight;
     };
-    for i in 0..SAMPLES {
+    for i in 0..samples {
         let h = ggx_vndf_sample(v, alpha, alpha, sample_2d(i, 0, 0));
         let u = 2.0 * v.dot(h) * h - v;
         let world = to_world * u;

@@ -8,7 +8,7 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use crate::Error;
 
 /// This folder's files.
-const FILES: [(&str, &str); 14] = [
+const FILES: [(&str, &str); 15] = [
     ("frame.wgsl", include_str!("frame.wgsl")),
     ("fuzz.wgsl", include_str!("fuzz.wgsl")),
     ("lighting.wgsl", include_str!("lighting.wgsl")),
@@ -22,6 +22,7 @@ const FILES: [(&str, &str); 14] = [
     ("deferred.wgsl", include_str!("deferred.wgsl")),
     ("background.wgsl", include_str!("background.wgsl")),
     ("shadow.wgsl", include_str!("shadow.wgsl")),
+    ("cutout.wgsl", include_str!("cutout.wgsl")),
     ("accumulate.wgsl", include_str!("accumulate.wgsl")),
 ];
 
@@ -53,6 +54,28 @@ impl ShaderSource {
     /// Names and texts of all files that are built in.
     pub fn files() -> impl Iterator<Item = (&'static str, &'static str)> {
         FILES.into_iter().chain([TONEMAP])
+    }
+
+    /// Refuses a folder that is not there, and one with a `.wgsl` file that no pass would read.
+    ///
+    /// # Errors
+    /// [`Error::Shader`] with the folder or the file, and the names that are read.
+    pub fn check(&self) -> Result<(), Error> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let complain = |e: &dyn std::fmt::Display| Error::Shader(format!("{}: {e}", folder.display()));
+        let entries = std::fs::read_dir(folder).map_err(|e| complain(&e))?;
+        let mut names = Vec::new();
+        for entry in entries {
+            names.push(entry.map_err(|e| complain(&e))?.file_name().to_string_lossy().into_owned());
+        }
+        names.sort();
+        // Editors keep their own files under names that begin with a dot.
+        let stranger = names.iter().find(|name| {
+            name.ends_with(".wgsl") && !name.starts_with('.') && !Self::files().any(|(file, _)| file == *name)
+        });
+        let Some(stranger) = stranger else { return Ok(()) };
+        let known: Vec<_> = Self::files().map(|(file, _)| file).collect();
+        Err(complain(&format!("{stranger} is no shader's name; those that are read: {}", known.join(", "))))
     }
 
     fn file(&self, name: &str) -> Result<String, Error> {

@@ -11,8 +11,10 @@ struct Material {
     flags: vec4u,
     // x roughness, y anisotropy, z rotation, w normal scale: turned by hand, see Adjustment.
     adjustment: vec4f,
-    // Rows of the six textures' transforms; w of the first row is the UV set.
-    transforms: array<vec4f, 12>,
+    // rgb colour of light that comes through diffusely, w its share.
+    translucency: vec4f,
+    // Rows of the eight textures' transforms; w of the first row is the UV set.
+    transforms: array<vec4f, 16>,
     // x 0: no skin, else which curvature: 1 zero, 2 mean, 3 directional, 4 normalised; y one over the largest
     // curvature of the tables, z that of the vertices' codes, w roughness of the second lobe of gloss.
     skin: vec4f,
@@ -27,14 +29,18 @@ struct Material {
 @group(1) @binding(4) var metallic_roughness_map: texture_2d<f32>;
 @group(1) @binding(5) var occlusion_map: texture_2d<f32>;
 @group(1) @binding(6) var emissive_map: texture_2d<f32>;
-@group(1) @binding(7) var normal_sampler: sampler;
-@group(1) @binding(8) var aniso_sampler: sampler;
-@group(1) @binding(9) var base_color_sampler: sampler;
-@group(1) @binding(10) var metallic_roughness_sampler: sampler;
-@group(1) @binding(11) var occlusion_sampler: sampler;
-@group(1) @binding(12) var emissive_sampler: sampler;
-@group(1) @binding(20) var skin_table: texture_2d<f32>;
-@group(1) @binding(21) var skin_ambient_table: texture_2d<f32>;
+@group(1) @binding(7) var translucency_map: texture_2d<f32>;
+@group(1) @binding(8) var translucent_color_map: texture_2d<f32>;
+@group(1) @binding(9) var normal_sampler: sampler;
+@group(1) @binding(10) var aniso_sampler: sampler;
+@group(1) @binding(11) var base_color_sampler: sampler;
+@group(1) @binding(12) var metallic_roughness_sampler: sampler;
+@group(1) @binding(13) var occlusion_sampler: sampler;
+@group(1) @binding(14) var emissive_sampler: sampler;
+@group(1) @binding(15) var translucency_sampler: sampler;
+@group(1) @binding(16) var translucent_color_sampler: sampler;
+@group(1) @binding(24) var skin_table: texture_2d<f32>;
+@group(1) @binding(25) var skin_ambient_table: texture_2d<f32>;
 
 struct Vertex {
     @location(0) position: vec3f,
@@ -79,6 +85,8 @@ fn surface_at(in: Varying, front: bool) -> Surface {
     let metallic_roughness = textureSample(metallic_roughness_map, metallic_roughness_sampler, uv(in, 3u));
     let occlusion = textureSample(occlusion_map, occlusion_sampler, uv(in, 4u)).r;
     let emissive = textureSample(emissive_map, emissive_sampler, uv(in, 5u)).rgb;
+    let translucency = textureSample(translucency_map, translucency_sampler, uv(in, 6u)).a;
+    let translucent_color = textureSample(translucent_color_map, translucent_color_sampler, uv(in, 7u)).rgb;
     let normal_xy = textureSample(normal_map, normal_sampler, uv(in, 0u)).rg * 2.0 - 1.0;
     let tilted = normal_xy * material.adjustment.w;
     let texel = textureSample(aniso_map, aniso_sampler, uv(in, 1u)).rgb;
@@ -118,6 +126,8 @@ fn surface_at(in: Varying, front: bool) -> Surface {
     surface.base_color = base.rgb;
     surface.metallic = saturate(material.factors.x * metallic_roughness.b);
     surface.transmissive = material.factors.w;
+    surface.translucency = saturate(material.translucency.w * translucency);
+    surface.translucent_color = material.translucency.rgb * translucent_color;
     surface.occlusion = 1.0 + material.emissive.w * (occlusion - 1.0);
     surface.emitted = material.emissive.rgb * emissive;
     surface.opacity = select(1.0, saturate(base.a), material.flags.y == 2u);

@@ -1,6 +1,6 @@
 //! What a renderer draws into.
 
-use super::{DEPTH, G_BUFFER, Gpu, HDR, Realtime, SUM, color_attachment, depth_attachment};
+use super::{DEPTH, G_BUFFER, Gpu, HDR, Realtime, SUM, Timer, color_attachment, depth_attachment};
 use crate::Error;
 use crate::reference::Film;
 
@@ -83,23 +83,39 @@ impl Target {
     }
 
     /// Clears everything and draws into the G-buffer.
-    pub(super) fn fill_pass<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::RenderPass<'a> {
+    pub(super) fn fill_pass<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        timer: Option<&Timer>,
+    ) -> wgpu::RenderPass<'a> {
         let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
         let [base, normal, factors] = self.g_buffer();
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("fill"),
             color_attachments: &[base, normal, factors, &self.hdr].map(|view| color_attachment(view, clear)),
             depth_stencil_attachment: Some(depth_attachment(&self.depth, wgpu::LoadOp::Clear(1.0))),
+            timestamp_writes: timer.map(|timer| timer.pass("fill")),
             ..Default::default()
         })
     }
 
-    /// Draws over what is there.
-    pub(super) fn hdr_pass<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::RenderPass<'a> {
+    /// Draws over what the deferred path left, or over nothing.
+    pub(super) fn hdr_pass<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        deferred: bool,
+        timer: Option<&Timer>,
+    ) -> wgpu::RenderPass<'a> {
+        let (color, depth) = if deferred {
+            (wgpu::LoadOp::Load, wgpu::LoadOp::Load)
+        } else {
+            (wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), wgpu::LoadOp::Clear(1.0))
+        };
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("forward"),
-            color_attachments: &[color_attachment(&self.hdr, wgpu::LoadOp::Load)],
-            depth_stencil_attachment: Some(depth_attachment(&self.depth, wgpu::LoadOp::Load)),
+            color_attachments: &[color_attachment(&self.hdr, color)],
+            depth_stencil_attachment: Some(depth_attachment(&self.depth, depth)),
+            timestamp_writes: timer.map(|timer| timer.pass("forward")),
             ..Default::default()
         })
     }
@@ -134,22 +150,28 @@ impl Target {
         );
         gpu.queue.submit([encoder.finish()]);
 
-        let failed = |e: &dyn std::fmt::Display| Error::Gpu(format!("the picture cannot be read back: {e}"));
-        let (sender, receiver) = std::sync::mpsc::channel();
-        buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-            // The receiver waits below.
-            let _ = sender.send(result);
-        });
-        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(&e))?;
-        receiver.recv().map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
-        let view = buffer.slice(..).get_mapped_range().map_err(|e| failed(&e))?;
+        let bytes = read_back(gpu, &buffer)?;
         let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
         let pixel = |p: &[u8]| {
             let [r, g, b, frames] = [0, 4, 8, 12].map(|at| number(&p[at..]));
             [r, g, b].map(|c| c / frames)
         };
-        let rows = view.chunks_exact(row as usize);
+        let rows = bytes.chunks_exact(row as usize);
         let pixels = rows.flat_map(|row| row[..16 * width as usize].chunks_exact(16).map(pixel)).collect();
         Ok(Film { width, height, pixels })
     }
+}
+
+/// The bytes of a buffer that the device was told to fill, once it has.
+pub(super) fn read_back(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, Error> {
+    let failed =
+        |e: &dyn std::fmt::Display| Error::Gpu(format!("the device does not give back its results: {e}"));
+    let (sender, receiver) = std::sync::mpsc::channel();
+    buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+        // The receiver waits below.
+        let _ = sender.send(result);
+    });
+    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(&e))?;
+    receiver.recv().map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
+    Ok(buffer.slice(..).get_mapped_range().map_err(|e| failed(&e))?.to_vec())
 }

@@ -54,10 +54,11 @@ fn agx(x: vec3f) -> vec3f {
 @fragment
 fn display(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     let sum = textureLoad(sum_texture, vec2i(pixel.xy), 0);
-    let radiance = max(sum.rgb / max(sum.w, 1.0) * frame.display.z, vec3f(0.0));
-    var shown = radiance;
+    var shown = max(sum.rgb / max(sum.w, 1.0), vec3f(0.0));
     // A channel is shown as it is.
     if frame.counts.z == 0u {
+        let radiance = shown * frame.display.z;
+        shown = radiance;
         switch u32(frame.display.w) {
             case 1u: { shown = aces(radiance); }
             case 2u: { shown = agx(radiance); }

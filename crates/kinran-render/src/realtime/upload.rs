@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use glam::{Mat3, Vec3};
+use glam::{Mat3, Vec3, Vec4};
 use half::f16;
 use kinran_image::{Format, Texture, Transfer};
 use kinran_scene::{AlphaMode, Light, Wrap};
@@ -12,6 +12,7 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
 use super::{Gpu, Layouts, fuzz, probe};
 use crate::reference::{
     BoundTexture, FLAT, MipTexture, RenderMaterial, RenderScene, SkinCurvature, SkinTable, Surroundings,
+    TextureFiltering,
 };
 
 /// Floats of a vertex: position, normal, tangent, both UV sets, colour, code of curvature.
@@ -39,6 +40,8 @@ pub(super) struct Material {
     pub(super) bind_group: wgpu::BindGroup,
     pub(super) path: Path,
     pub(super) double_sided: bool,
+    /// Alpha below a cutoff is a hole.
+    pub(super) cutout: bool,
 }
 
 /// What a person may turn of a material whose roughness and normals are baked, without baking again.
@@ -101,7 +104,13 @@ impl GpuScene {
         self.materials[index].path = path(material);
     }
 
-    pub(super) fn new(gpu: &Gpu, layouts: &Layouts, scene: &RenderScene, light: &GpuLight) -> Self {
+    pub(super) fn new(
+        gpu: &Gpu,
+        layouts: &Layouts,
+        scene: &RenderScene,
+        light: &GpuLight,
+        filtering: TextureFiltering,
+    ) -> Self {
         let buffer = |contents: &[u8], usage| {
             gpu.device.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })
         };
@@ -132,7 +141,7 @@ impl GpuScene {
             });
         }
 
-        let mut textures = Textures { gpu, views: HashMap::new(), samplers: HashMap::new() };
+        let mut textures = Textures { gpu, filtering, views: HashMap::new(), samplers: HashMap::new() };
         let materials = {
             let range = geometry.curvature_range();
             scene.materials.iter().map(|m| material(&mut textures, layouts, m, range)).collect()
@@ -166,10 +175,10 @@ impl GpuLight {
         let environment = &surroundings.environment;
         let (width, height) = (environment.width(), environment.height());
         let texels = (0..height).flat_map(|y| (0..width).map(move |x| environment.texel(x, y))).collect();
-        let size = (2 * probe::HEIGHT as u32, probe::HEIGHT as u32);
+        let rows = probe::height(environment) as u32;
         Self {
             environment: float_texture(gpu, (width as u32, height as u32), &half_levels(&[texels])),
-            probe: float_texture(gpu, size, &half_levels(&probe::prefilter(environment))),
+            probe: float_texture(gpu, (2 * rows, rows), &half_levels(&probe::prefilter(environment))),
         }
     }
 }
@@ -220,6 +229,7 @@ pub(super) fn albedo_table(gpu: &Gpu) -> wgpu::TextureView {
 /// Textures and samplers, each uploaded once however many materials use it.
 struct Textures<'a> {
     gpu: &'a Gpu,
+    filtering: TextureFiltering,
     /// By address of the texels, which the scene keeps alive.
     views: HashMap<usize, wgpu::TextureView>,
     samplers: HashMap<[Wrap; 2], wgpu::Sampler>,
@@ -248,6 +258,10 @@ impl Textures<'_> {
             Wrap::Mirror => wgpu::AddressMode::MirrorRepeat,
             Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
         };
+        let (lod_max_clamp, anisotropy_clamp) = match self.filtering {
+            TextureFiltering::Mips { max_anisotropy } => (32.0, max_anisotropy as u16),
+            TextureFiltering::Level0 => (0.0, 1),
+        };
         let create = || {
             self.gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 address_mode_u: mode(wrap[0]),
@@ -255,7 +269,8 @@ impl Textures<'_> {
                 mag_filter: wgpu::FilterMode::Linear,
                 min_filter: wgpu::FilterMode::Linear,
                 mipmap_filter: wgpu::MipmapFilterMode::Linear,
-                anisotropy_clamp: 16,
+                lod_max_clamp,
+                anisotropy_clamp,
                 ..Default::default()
             })
         };
@@ -297,8 +312,12 @@ fn skin_table(gpu: &Gpu, table: &SkinTable) -> wgpu::TextureView {
     )
 }
 
-/// The six textures of a material, `white` where it has none.
-fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTexture; 6] {
+/// Textures of a material.
+pub(super) const SLOTS: usize = 8;
+
+/// They, `white` where it has none.
+fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTexture; SLOTS] {
+    let translucency = m.translucency.as_ref();
     [
         m.surface.as_ref().map_or(white, |s| &s.normal),
         m.surface.as_ref().map_or(white, |s| &s.aniso),
@@ -306,6 +325,8 @@ fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTextur
         m.metallic_roughness.as_ref().unwrap_or(white),
         m.occlusion.as_ref().unwrap_or(white),
         m.emissive.as_ref().unwrap_or(white),
+        translucency.and_then(|t| t.map.as_ref()).unwrap_or(white),
+        translucency.and_then(|t| t.color.as_ref()).unwrap_or(white),
     ]
 }
 
@@ -323,6 +344,8 @@ fn material_floats(m: &RenderMaterial, adjustment: Adjustment, curvature_range: 
     floats.extend([u32::from(m.surface.is_some()), mode, 0, 0].map(f32::from_bits));
     let Adjustment { roughness, anisotropy, rotation, normal_scale } = adjustment;
     floats.extend([roughness, anisotropy, rotation, normal_scale]);
+    let translucency = m.translucency.as_ref().map_or(Vec4::ZERO, |t| t.color_factor.extend(t.factor));
+    floats.extend(translucency.to_array());
     for slot in slots(m, &BoundTexture::constant([1.0; 4])) {
         let Mat3 { x_axis, y_axis, z_axis } = slot.transform;
         floats.extend([x_axis.x, y_axis.x, z_axis.x, slot.uv_set as f32]);
@@ -392,14 +415,32 @@ fn material(
         layout: &layouts.material,
         entries: &entries,
     });
-    Material { uniform, fuzz, bind_group, path: path(m), double_sided: m.double_sided }
+    Material {
+        uniform,
+        fuzz,
+        bind_group,
+        path: path(m),
+        double_sided: m.double_sided,
+        cutout: matches!(m.alpha_mode, AlphaMode::Mask { .. }),
+    }
 }
 
 /// The pass that draws a material.
 fn path(m: &RenderMaterial) -> Path {
+    // In the G-buffer light comes through in the base colour.
+    let own_color = m.translucency.as_ref().is_some_and(|t| {
+        let same = |a: &BoundTexture, b: &BoundTexture| {
+            Arc::ptr_eq(&a.texture, &b.texture) && (a.uv_set, a.transform) == (b.uv_set, b.transform)
+        };
+        let same_map = match (&t.color, &m.base_color) {
+            (Some(a), Some(b)) => same(a, b),
+            (a, b) => a.is_none() && b.is_none(),
+        };
+        t.factor > 0.0 && !(same_map && t.color_factor == m.base_color_factor.truncate())
+    });
     if m.alpha_mode == AlphaMode::Blend || m.transmissive {
         Path::Blended
-    } else if m.surface.is_some() || m.skin.is_some() || fuzz::is_forward(m) {
+    } else if m.surface.is_some() || own_color || m.skin.is_some() || fuzz::is_forward(m) {
         Path::Forward
     } else {
         Path::Deferred

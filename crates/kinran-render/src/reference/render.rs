@@ -289,9 +289,12 @@ impl Renderer<'_> {
                 }
                 continue;
             }
-            let reflected = shading.reflected(to_shading * light.direction) * light.irradiance;
-            if reflected.max_element() > 0.0 {
-                sum += reflected * self.visibility(point, hit, view, light.direction, light.distance);
+            let u = to_shading * light.direction;
+            let scattered = shading.scattered(u) * light.irradiance;
+            if scattered.max_element() > 0.0 {
+                // Light from behind arrives at the other side.
+                let side = if u.z < 0.0 && shading.translucent != Vec3::ZERO { -view } else { view };
+                sum += scattered * self.visibility(point, hit, side, light.direction, light.distance);
             }
         }
         if let Some(surroundings) = &self.scene.surroundings {
@@ -307,7 +310,10 @@ impl Renderer<'_> {
                 }
                 _ => surroundings.irradiance(n),
             };
-            let diffuse = shading.diffuse * FRAC_1_PI * irradiance;
+            let mut diffuse = shading.diffuse * FRAC_1_PI * irradiance;
+            if shading.translucent != Vec3::ZERO {
+                diffuse += shading.translucent * FRAC_1_PI * surroundings.irradiance(-n);
+            }
             let specular = self.environment_specular(shading, surroundings, sample);
             sum += shading.occlusion * (diffuse + specular);
         }
@@ -377,12 +383,12 @@ impl Renderer<'_> {
         sum / count as f32
     }
 
-    /// The share of a light that reaches a point.
+    /// The share of a light that reaches a point, on the side of the surface that `side` looks at.
     fn visibility(
         &self,
         point: &SurfacePoint,
         hit: &Hit,
-        view: Vec3,
+        side: Vec3,
         direction: Vec3,
         distance: f32,
     ) -> Vec3 {
@@ -390,7 +396,7 @@ impl Renderer<'_> {
             return Vec3::ONE;
         }
         let geometry = &self.scene.geometry;
-        let facing = if point.geometric_normal.dot(view) < 0.0 { -1.0 } else { 1.0 };
+        let facing = if point.geometric_normal.dot(side) < 0.0 { -1.0 } else { 1.0 };
         let origin = geometry.shadow_origin(hit, facing * point.geometric_normal);
         if !self.cutouts {
             return Vec3::splat(f32::from(u8::from(

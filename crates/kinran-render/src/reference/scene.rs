@@ -31,6 +31,19 @@ pub struct SurfaceTextures {
     pub aniso: BoundTexture,
 }
 
+/// Light that a thin surface scatters to its other side; see [`kinran_scene::DiffuseTransmission`].
+#[derive(Clone, Debug)]
+pub struct Translucency {
+    /// Share of the scattered light, multiplied with A of `map`.
+    pub factor: f32,
+    /// A is a share.
+    pub map: Option<BoundTexture>,
+    /// Linear colour, multiplied with `color`.
+    pub color_factor: Vec3,
+    /// Linear RGB.
+    pub color: Option<BoundTexture>,
+}
+
 /// A material with its textures.
 #[derive(Clone, Debug)]
 pub struct RenderMaterial {
@@ -56,6 +69,8 @@ pub struct RenderMaterial {
     pub emissive: Option<BoundTexture>,
     /// Pre-integrated skin in place of the Lambert lobe. [`RenderScene::new`] leaves it out: whoever has the tables sets it.
     pub skin: Option<RenderSkin>,
+    /// Light that passes through diffusely.
+    pub translucency: Option<Translucency>,
     /// What alpha does.
     pub alpha_mode: AlphaMode,
     /// Both sides are lit; otherwise back faces are invisible.
@@ -209,6 +224,15 @@ impl TextureLoader<'_> {
             emissive_factor: m.emissive_factor,
             emissive: load(&m.emissive, Transfer::Srgb)?,
             skin: None,
+            translucency: match &m.diffuse_transmission {
+                Some(d) => Some(Translucency {
+                    factor: d.factor,
+                    map: load(&d.texture, Transfer::Linear)?,
+                    color_factor: d.color_factor,
+                    color: load(&d.color, Transfer::Srgb)?,
+                }),
+                None => None,
+            },
             alpha_mode: m.alpha_mode,
             double_sided: m.double_sided,
             fuzz: match &m.fuzz {

@@ -2,7 +2,8 @@
 //!
 //! The model is glTF's metallic-roughness: a GGX lobe with height-correlated Smith masking, Schlick's Fresnel
 //! and multiscatter compensation; under it, for the part that is not metal, a Lambert lobe of what the
-//! specular lobe leaves for the view direction.
+//! specular lobe leaves for the view direction. `KHR_materials_diffuse_transmission` turns a share of that lobe
+//! to the other side of the surface.
 
 use super::{
     albedo::specular_albedo,
@@ -39,6 +40,8 @@ pub(crate) struct Shading {
     compensation: Vec3,
     /// Albedo of the Lambert lobe.
     pub(crate) diffuse: Vec3,
+    /// Albedo of the Lambert lobe for light from behind.
+    pub(crate) translucent: Vec3,
     /// Share of the light behind the surface that comes through.
     pub(crate) transmitted: Vec3,
     /// 0 to 1, for ambient light only.
@@ -147,7 +150,16 @@ impl Shading {
         let f0 = Vec3::splat(DIELECTRIC_F0).lerp(base.xyz(), metallic);
         let inside = 1.0 - specular_albedo(DIELECTRIC_F0, v.z, alpha_t, alpha_b);
         let passed = base.xyz() * (1.0 - metallic) * inside;
-        let diffuse = if material.transmissive { Vec3::ZERO } else { passed };
+        let (scattered, translucent) = match &material.translucency {
+            Some(t) => {
+                let share = (t.factor * sample(&t.map, point, filtering).w).clamp(0.0, 1.0);
+                let color = t.color_factor * sample(&t.color, point, filtering).xyz();
+                (passed * (1.0 - share), color * share * (1.0 - metallic) * inside)
+            }
+            None => (passed, Vec3::ZERO),
+        };
+        let opaque = f32::from(u8::from(!material.transmissive));
+        let diffuse = scattered * opaque;
         let fuzz = (material.fuzz.as_ref())
             .and_then(|fuzz| FuzzAt::new(fuzz, point, filtering, to_world, frame, v, diffuse));
         let occlusion = sample(&material.occlusion, point, filtering).x;
@@ -159,7 +171,8 @@ impl Shading {
             f0,
             compensation: multiscatter_compensation(f0, v.z, alpha_t, alpha_b),
             diffuse,
-            transmitted: if material.transmissive { passed } else { Vec3::ZERO },
+            translucent: translucent * opaque,
+            transmitted: passed * (1.0 - opaque),
             occlusion: 1.0 + material.occlusion_strength * (occlusion - 1.0),
             emitted: material.emissive_factor * sample(&material.emissive, point, filtering).xyz(),
             opacity: opacity(material, base),
@@ -189,7 +202,14 @@ impl Shading {
         lobe * schlick_f(self.f0, self.v.dot(h)) * self.compensation
     }
 
-    /// All of the BRDF for a light along `u` in the shading frame, per steradian, times the cosine.
+    /// All of the BSDF for a light along `u` in the shading frame, per steradian, times the cosine: what is reflected
+    /// of light from the front, what comes through of light from behind.
+    #[inline]
+    pub(crate) fn scattered(&self, u: Vec3) -> Vec3 {
+        self.reflected(u) + self.translucent * (FRAC_1_PI * (-u.z).max(0.0))
+    }
+
+    /// Of it what is reflected, through the fuzz if there is any.
     #[inline]
     pub(crate) fn reflected(&self, u: Vec3) -> Vec3 {
         let base = (self.diffuse * FRAC_1_PI + self.specular(u)) * u.z.max(0.0);

@@ -65,6 +65,7 @@ pub(crate) fn material(base_color: Vec3, metallic: f32, roughness: f32) -> Mater
         anisotropy: None,
         skin: None,
         fuzz: None,
+        diffuse_transmission: None,
         alpha_mode: AlphaMode::Opaque,
         double_sided: false,
         ignored_extensions: Vec::new(),

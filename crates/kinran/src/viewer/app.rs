@@ -7,26 +7,32 @@ use std::time::{Duration, Instant, SystemTime};
 
 use eframe::egui::{self, Color32, Key, Rect, Sense, pos2, vec2};
 use glam::Vec3;
-use kinran_render::realtime::{Gpu, GpuScene, Realtime, Settings, ShaderSource, Target};
+use kinran_render::realtime::{Gpu, GpuScene, Realtime, Settings, ShaderSource, Target, left_out};
 use kinran_render::reference::{Background, Film};
 use kinran_render::tonemap::to_srgb8;
 use kinran_scene::Light;
 
-use super::fuzz::FuzzParameters;
 use super::loader::{self, Event, Job, Loader, Opened};
 use super::orbit::Orbit;
 use super::panel::{KEYS, Shown, Wishes, panel};
-use super::parameters::{CHANNELS, METHODS, MaterialParameters, Parameters, SkinParameters};
+use super::parameters::{CHANNELS, METHODS, MaterialParameters, Parameters};
 use crate::Error;
+use crate::outputs::has_extension;
 use crate::render::write_rgb8;
 use crate::surfaces::Mips;
-use crate::view::{EnvironmentChoice, ViewArgs};
+use crate::view::{EnvironmentChoice, ViewArgs, file_name};
 
 /// Frames after which a still picture is smooth; chosen by eye.
 const FRAMES: u32 = 64;
 
 /// How often the shader folder is looked at.
 const SHADER_INTERVAL: Duration = Duration::from_millis(300);
+
+/// How often the progress of a bake is shown.
+const PROGRESS_INTERVAL: Duration = Duration::from_millis(200);
+
+/// Points; the longest label fits.
+const PANEL_WIDTH: f32 = 370.0;
 
 /// Radiance behind models; as pictures of `kinran render` have it.
 const BACKDROP: Vec3 = Vec3::new(0.085, 0.087, 0.092);
@@ -57,6 +63,8 @@ struct Model {
     scenes: HashMap<Mips, GpuScene>,
     asked: HashSet<Mips>,
     mapped: Vec<bool>,
+    /// From the file's being read to the first picture of it.
+    first_picture: Option<Duration>,
 }
 
 /// The window.
@@ -78,10 +86,20 @@ pub(super) struct App {
     shaders: ShaderSource,
     shader_stamp: Option<SystemTime>,
     shader_check: Instant,
+    title: String,
     help: bool,
     screenshot: Option<PathBuf>,
     closing: Arc<Mutex<bool>>,
-    failure: Arc<Mutex<Option<Error>>>,
+    outcome: Arc<Mutex<Outcome>>,
+}
+
+/// What the command has to tell when the window is closed.
+#[derive(Default)]
+pub(super) struct Outcome {
+    /// What went wrong inside.
+    pub(super) failure: Option<Error>,
+    /// Of the last model, from its being read to its first picture.
+    pub(super) first_picture: Option<Duration>,
 }
 
 impl App {
@@ -89,7 +107,7 @@ impl App {
     pub(super) fn new(
         context: &eframe::CreationContext,
         start: Start,
-        failure: Arc<Mutex<Option<Error>>>,
+        outcome: Arc<Mutex<Outcome>>,
     ) -> Result<Self, Error> {
         let display = context.wgpu_render_state.clone();
         let display = display.ok_or_else(|| Error::Usage("the window has no GPU to draw with".into()))?;
@@ -128,10 +146,11 @@ impl App {
             shader_stamp: newest(&shaders),
             shaders,
             shader_check: Instant::now(),
+            title: String::new(),
             help: false,
             screenshot: start.screenshot,
             closing: Arc::default(),
-            failure,
+            outcome,
         })
     }
 
@@ -143,7 +162,8 @@ impl App {
                 Event::Failed(what) => {
                     // A picture that cannot be taken any more must not keep a program waiting.
                     if self.screenshot.is_some() {
-                        *self.failure.lock().expect("no thread panics") = Some(Error::Usage(what.clone()));
+                        self.outcome.lock().expect("no thread panics").failure =
+                            Some(Error::Usage(what.clone()));
                         *self.closing.lock().expect("no thread panics") = true;
                     }
                     self.message = what;
@@ -167,29 +187,27 @@ impl App {
     }
 
     fn open(&mut self, opened: Opened) {
-        let authored: Vec<_> = (opened.scene.materials.iter())
-            .map(|m| MaterialParameters {
-                base_color: m.base_color_factor.truncate().to_array(),
-                metallic: m.metallic_factor,
-                roughness: m.roughness_factor,
-                anisotropy: 1.0,
-                rotation: 0.0,
-                normal_scale: 1.0,
-                emissive: m.emissive_factor.to_array(),
-                occlusion: m.occlusion_strength,
-                fuzz: FuzzParameters::from(&m.fuzz),
-                skin: m.skin.as_ref().map(SkinParameters::of),
-            })
-            .collect();
+        let authored: Vec<_> = opened.scene.materials.iter().map(MaterialParameters::authored).collect();
         // Saved parameters belong to a model with as many materials.
+        let saved = self.parameters.materials.len();
+        let strangers = (self.model.is_none() && saved != 0 && saved != authored.len()).then(|| {
+            format!("the parameters are of a model with {saved} materials; this one's are as authored")
+        });
         if self.model.is_some() || self.parameters.materials.len() != authored.len() {
             self.parameters.materials.clone_from(&authored);
             self.parameters.orbit = None;
+            self.parameters.intensities.clear();
         }
-        let middle = loader::middle(&opened.scene);
-        self.parameters.orbit.get_or_insert_with(|| Orbit::new(&opened.view.camera, middle));
-        self.message = opened.warnings.join("\n");
+        if self.parameters.intensities.len() != opened.view.lights.len() {
+            self.parameters.intensities = opened.view.lights.iter().map(|l| l.color.max_element()).collect();
+        }
+        // That point lights cast no shadows stands at the switch.
+        let mut messages = opened.warnings.clone();
+        messages.extend(left_out(&opened.scene, &Settings { shadows: false, ..self.settings() }));
+        messages.extend(strangers);
+        self.message = messages.join("\n");
         self.model = Some(Model {
+            first_picture: None,
             mapped: vec![false; authored.len()],
             opened,
             authored,
@@ -222,6 +240,7 @@ impl App {
         let wanted = self.parameters.methods.map(|i| METHODS[i].1);
         let sides = if self.parameters.split { 2 } else { 1 };
         self.busy.is_empty()
+            && self.loader.baking().is_none()
             && (0..sides).all(|i| {
                 self.sides[i].as_ref().is_some_and(|s| s.mips == Some(wanted[i]) && s.target.frames >= FRAMES)
             })
@@ -239,19 +258,19 @@ impl App {
                 lights.push(p.sun.light());
             }
             if p.own_lights {
-                lights.extend(&model.opened.view.lights);
+                lights.extend(model.opened.view.lights.iter().zip(&p.intensities).map(
+                    |(light, &intensity)| {
+                        let hue = light.color / light.color.max_element().max(f32::MIN_POSITIVE);
+                        Light { color: intensity * hue, ..*light }
+                    },
+                ));
             }
             for scene in model.scenes.values_mut() {
                 scene.set_lights(lights.clone());
                 for (i, m) in p.materials.iter().enumerate() {
                     let mut material = scene.scene().materials[i].clone();
                     let mapped = material.surface.is_some();
-                    material.base_color_factor =
-                        Vec3::from(m.base_color).extend(material.base_color_factor.w);
-                    material.metallic_factor = m.metallic;
-                    material.roughness_factor = m.roughness;
-                    material.emissive_factor = Vec3::from(m.emissive);
-                    material.occlusion_strength = m.occlusion;
+                    m.apply(&mut material);
                     material.fuzz = m.fuzz.fuzz(&model.opened.scene.materials[i].fuzz);
                     if let (Some(skin), Some(parameters)) = (&mut material.skin, &m.skin) {
                         parameters.apply(skin);
@@ -274,6 +293,7 @@ impl App {
     fn settings(&self) -> Settings {
         Settings {
             shadows: self.parameters.shadows,
+            reflections: true,
             background: if self.parameters.background {
                 Background::Environment { blur: 0.0 }
             } else {
@@ -319,6 +339,12 @@ impl App {
         if side.target.frames < FRAMES {
             renderer.draw(scene, &orbit.camera(), &settings, &mut side.target);
             renderer.show(&side.target, &side.view, scene);
+            if let Some(model) = self.model.as_mut().filter(|model| model.first_picture.is_none()) {
+                // Said once the picture is there, not once it is ordered.
+                let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+                model.first_picture = Some(model.opened.at.elapsed());
+                self.outcome.lock().expect("no thread panics").first_picture = model.first_picture;
+            }
         }
     }
 
@@ -349,31 +375,54 @@ impl App {
         if ctx.egui_wants_keyboard_input() {
             return wishes;
         }
-        let (mut reload, p) = (false, &mut self.parameters);
-        ctx.input(|input| {
-            let command = input.modifiers.command;
-            wishes.save_parameters = command && input.key_pressed(Key::S);
-            if command {
-                return;
-            }
-            wishes.frame_model = input.key_pressed(Key::F);
-            wishes.save_picture = input.key_pressed(Key::P);
-            p.split ^= input.key_pressed(Key::C);
-            if input.key_pressed(Key::X) {
-                p.methods.swap(0, 1);
-            }
-            reload = input.key_pressed(Key::R);
-            self.help ^= input.key_pressed(Key::Questionmark);
-            self.help &= !input.key_pressed(Key::Escape);
-            p.exposure +=
-                if input.key_pressed(Key::Plus) || input.key_pressed(Key::Equals) { 1.0 / 3.0 } else { 0.0 };
-            p.exposure -= if input.key_pressed(Key::Minus) { 1.0 / 3.0 } else { 0.0 };
-            let digits =
-                [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8];
-            if let Some(i) = digits.iter().position(|&key| input.key_pressed(key)) {
-                p.channel = i;
-            }
+        // Event by event: a slow frame may hold several presses of a key, and the release of the one held with it.
+        let presses: Vec<_> = ctx.input(|input| {
+            let press = |event: &egui::Event| match *event {
+                egui::Event::Key { key, pressed: true, repeat, modifiers, .. } => {
+                    Some((key, repeat, modifiers))
+                }
+                _ => None,
+            };
+            input.events.iter().filter_map(press).collect()
         });
+        let (mut reload, p) = (false, &mut self.parameters);
+        for (key, repeat, modifiers) in presses {
+            match key {
+                // These may be held down.
+                Key::Plus | Key::Equals => p.exposure = stepped(p.exposure, 1.0),
+                Key::Minus => p.exposure = stepped(p.exposure, -1.0),
+                // Its release comes as that of the key without shift, so that its next press is taken for a repetition.
+                Key::Questionmark => self.help = !self.help,
+                _ if repeat => {}
+                Key::S if modifiers.command => wishes.save_parameters = true,
+                Key::Q if modifiers.command => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+                _ if modifiers.command => {}
+                Key::F => wishes.frame_model = true,
+                Key::P => wishes.save_picture = true,
+                Key::C => p.split = !p.split,
+                Key::X => p.methods.swap(0, 1),
+                Key::R => reload = true,
+                Key::Escape => {
+                    self.help = false;
+                    self.message.clear();
+                }
+                _ => {
+                    let digits = [
+                        Key::Num1,
+                        Key::Num2,
+                        Key::Num3,
+                        Key::Num4,
+                        Key::Num5,
+                        Key::Num6,
+                        Key::Num7,
+                        Key::Num8,
+                    ];
+                    if let Some(channel) = digits.iter().position(|&digit| digit == key) {
+                        p.channel = channel;
+                    }
+                }
+            }
+        }
         if reload {
             self.reload(true);
         }
@@ -383,8 +432,7 @@ impl App {
     fn grant(&mut self, wishes: Wishes) {
         if let Some(model) = &self.model {
             if wishes.frame_model {
-                self.parameters.orbit =
-                    Some(Orbit::new(&model.opened.view.camera, loader::middle(&model.opened.scene)));
+                self.parameters.orbit = None;
             }
             if wishes.reset_material
                 && let Some(material) = self.parameters.materials.get_mut(self.material)
@@ -416,6 +464,20 @@ impl App {
                 Ok(()) => format!("saved {}", path.display()),
                 Err(error) => error.to_string(),
             };
+        }
+    }
+
+    /// A model, or an environment, which is seen behind it too.
+    fn dropped(&mut self, path: &Path) {
+        if ["hdr", "exr"].iter().any(|extension| has_extension(path, extension)) {
+            self.parameters.environment = path.to_string_lossy().into_owned();
+            self.parameters.background = true;
+            self.grant(Wishes { light: true, ..Wishes::default() });
+            return;
+        }
+        match loader::model_in(path) {
+            Ok(file) => self.loader.ask(Job::Open(file, args_with_light(&self.args, &self.parameters))),
+            Err(error) => self.message = error.to_string(),
         }
     }
 
@@ -453,6 +515,14 @@ impl App {
             }
             self.parameters.split_at =
                 ((line + drag.drag_delta().x - rect.left()) / rect.width()).clamp(0.0, 1.0);
+        }
+        // Without an orbit the model is framed: its camera sees all of it in a square.
+        if let Some(model) = &self.model {
+            self.parameters.orbit.get_or_insert_with(|| {
+                let mut orbit = Orbit::new(&model.opened.view.camera, loader::middle(&model.opened.scene));
+                orbit.distance *= (rect.height() / rect.width()).max(1.0);
+                orbit
+            });
         }
         if let Some(orbit) = &mut self.parameters.orbit {
             let delta = response.drag_delta();
@@ -502,24 +572,29 @@ impl App {
         }
         if self.model.is_none() && self.busy.is_empty() {
             let font = egui::FontId::proportional(20.0);
-            let text = "drop a .glb or .gltf file here";
+            let text = "drop a .glb or .gltf file here, or a baked folder";
             painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, Color32::GRAY);
         }
     }
 
     /// Words over the picture: what is being done, what went wrong, the keys.
     fn words(&mut self, ctx: &egui::Context) {
-        if !self.busy.is_empty() {
+        let baking = self.loader.baking();
+        if !self.busy.is_empty() || baking.is_some() {
             egui::Area::new(egui::Id::unique("busy"))
                 .anchor(egui::Align2::LEFT_BOTTOM, vec2(12.0, -12.0))
                 .show(ctx, |ui| {
                     egui::Frame::popup(ui.style()).show(ui, |ui| {
-                        ui.horizontal(|ui| {
-                            ui.spinner();
+                        if !self.busy.is_empty() {
                             ui.label(&self.busy);
-                        });
+                        }
+                        if let Some((what, share)) = baking {
+                            ui.add(egui::ProgressBar::new(share).desired_width(220.0).text(what));
+                        }
                     });
                 });
+            // The bar moves while the picture stands still.
+            ctx.request_repaint_after(PROGRESS_INTERVAL);
         }
         let mut open = !self.message.is_empty();
         egui::Window::new("Message")
@@ -562,11 +637,11 @@ impl App {
             return;
         }
         let Some(path) = self.screenshot.take() else { return };
-        let (closing, failure, wake) = (self.closing.clone(), self.failure.clone(), ctx.clone());
+        let (closing, outcome, wake) = (self.closing.clone(), self.outcome.clone(), ctx.clone());
         ctx.request_screenshot(move |image| {
             let pixels = image.pixels.iter().map(|p| [p.r(), p.g(), p.b()]).collect();
             if let Err(error) = write_rgb8(&path, image.size[0] as u32, image.size[1] as u32, pixels) {
-                *failure.lock().expect("no thread panics") = Some(error);
+                outcome.lock().expect("no thread panics").failure = Some(error);
             }
             *closing.lock().expect("no thread panics") = true;
             wake.request_repaint();
@@ -581,10 +656,7 @@ impl eframe::App for App {
         self.reload(false);
         let dropped = ctx.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
         if let Some(path) = dropped {
-            match loader::model_in(&path) {
-                Ok(file) => self.loader.ask(Job::Open(file, args_with_light(&self.args, &self.parameters))),
-                Err(error) => self.message = error.to_string(),
-            }
+            self.dropped(&path);
         }
         let mut wishes = self.keys(&ctx);
 
@@ -592,15 +664,20 @@ impl eframe::App for App {
             name: self.model.as_ref().map_or("no model", |m| &m.opened.name),
             material_names: self.model.as_ref().map_or(&[], |m| &m.opened.material_names),
             mapped: self.model.as_ref().map_or(&[], |m| &m.mapped),
+            alpha_modes: &self.model.as_ref().map_or_else(Vec::new, |m| {
+                m.opened.scene.materials.iter().map(|material| material.alpha_mode).collect()
+            }),
+            lights: self.model.as_ref().map_or(&[], |m| &m.opened.view.lights),
             baked: &self
                 .model
                 .as_ref()
                 .map_or_else(Vec::new, |m| m.scenes.keys().copied().collect::<Vec<_>>()),
             frames: self.sides[0].as_ref().map_or(0, |side| side.target.frames),
             frames_wanted: FRAMES,
+            first_picture: self.model.as_ref().and_then(|model| model.first_picture),
         };
         let (parameters, material) = (&mut self.parameters, &mut self.material);
-        egui::Panel::right("controls").default_size(320.0).show(ui, |ui| {
+        egui::Panel::right("controls").exact_size(PANEL_WIDTH).show(ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| {
                 let asked = panel(ui, parameters, material, &shown);
                 wishes = Wishes {
@@ -613,16 +690,45 @@ impl eframe::App for App {
         });
         egui::CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
         self.grant(wishes);
+        if wishes != Wishes::default() {
+            // What was granted is seen in the next frame.
+            ctx.request_repaint();
+        }
         self.words(&ctx);
         self.take_screenshot(&ctx);
 
+        // The title names the model, with dots until its picture is smooth.
+        let unsettled = self.model.is_some() && !self.settled();
+        let dots = if unsettled || !self.busy.is_empty() { " …" } else { "" };
+        let title = match &self.model {
+            Some(model) => format!("{}{dots} - Kinran", file_name(Path::new(&model.opened.name))),
+            None => format!("Kinran{dots}"),
+        };
+        if title != self.title {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
+            self.title = title;
+        }
+
         // Until the picture is smooth there is a next frame; after that, only the shader folder is looked at.
-        if self.model.is_some() && !self.settled() {
+        if unsettled {
             ctx.request_repaint();
         } else if self.shaders.folder.is_some() {
             ctx.request_repaint_after(SHADER_INTERVAL);
         }
     }
+
+    /// A software device that still draws while the process ends crashes it.
+    fn on_exit(&mut self) {
+        self.loader.close();
+        // A device that is lost draws nothing any more either.
+        let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+    }
+}
+
+/// An exposure so many thirds of a stop away, rounded so that three steps there and back lead to where they began.
+fn stepped(exposure: f32, thirds: f32) -> f32 {
+    // Plus zero: no -0 is shown.
+    ((exposure + thirds / 3.0) * 1e3).round() / 1e3 + 0.0
 }
 
 /// Whether two sets of parameters give the same two pictures: the split line may have moved.

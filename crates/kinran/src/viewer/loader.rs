@@ -1,19 +1,25 @@
-//! Reading, baking and bringing to the device, in a thread of its own: the window never waits.
+//! Reading, baking and bringing to the device, in threads of their own: the window never waits.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, RwLock};
+use std::sync::{Arc, Mutex, RwLock};
+use std::thread::JoinHandle;
+use std::time::Instant;
 
 use glam::Vec3;
 use kinran_image::write_atomically;
 use kinran_render::realtime::{GpuLight, GpuScene, Realtime, ShaderSource};
-use kinran_render::reference::{RenderScene, SurfaceTextures, Surroundings};
+use kinran_render::reference::{RenderScene, SurfaceTextures, Surroundings, TextureFiltering};
 use kinran_scene::Scene;
 
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::view::{EnvironmentChoice, View, ViewArgs, environment};
 use crate::{Error, Progress};
+
+/// Textures of every material of a model.
+type Surfaces = Vec<Option<SurfaceTextures>>;
 
 /// What the window asks for.
 pub(super) enum Job {
@@ -23,6 +29,8 @@ pub(super) enum Job {
     Bake(Mips),
     /// Other light from all around: a choice, and its rotation in degrees.
     Light(EnvironmentChoice, f32),
+    /// What the baker made for the model of a number.
+    Baked(u64, Mips, Result<Surfaces, Error>),
 }
 
 /// What the window gets.
@@ -33,7 +41,7 @@ pub(super) enum Event {
     Baked(Mips, Box<GpuScene>),
     /// All that was baked is out of date: the light changed.
     LightChanged,
-    /// What is being done; empty when nothing is.
+    /// What is being read; empty when nothing is.
     Busy(String),
     /// What went wrong.
     Failed(String),
@@ -46,21 +54,80 @@ pub(super) struct Opened {
     pub(super) material_names: Vec<String>,
     pub(super) scene: RenderScene,
     pub(super) warnings: Vec<String>,
+    /// When it was read.
+    pub(super) at: Instant,
 }
 
-/// The thread.
-pub(super) struct Loader {
-    jobs: Sender<Job>,
-    events: Receiver<Event>,
+/// What is being baked, and the share of it that is done.
+pub(super) type Baking = Option<(String, f32)>;
+
+/// What both threads and the window see.
+#[derive(Default)]
+struct Common {
+    /// The number of the model that is shown: bakes for another one are not begun.
+    model: AtomicU64,
+    /// The window is closing: the device is not touched any more.
+    closing: AtomicBool,
+    baking: Mutex<Baking>,
 }
+
+impl Common {
+    fn set_baking(&self, baking: Baking) {
+        *self.baking.lock().expect("no thread panics") = baking;
+    }
+}
+
+/// A thread that reads and brings to the device, and one that bakes.
+pub(super) struct Loader {
+    jobs: Option<Sender<Job>>,
+    events: Receiver<Event>,
+    common: Arc<Common>,
+    reader: Option<JoinHandle<()>>,
+}
+
+/// A model to be baked: its number, itself, and the method.
+type Bake = (u64, Arc<Scene>, Mips);
 
 impl Loader {
-    /// Starts it. `wake` is called whenever there is an event.
-    pub(super) fn start(renderer: Arc<RwLock<Realtime>>, wake: impl Fn() + Send + 'static) -> Self {
+    /// Starts them. `wake` is called whenever there is something new.
+    pub(super) fn start(
+        renderer: Arc<RwLock<Realtime>>,
+        wake: impl Fn() + Clone + Send + Sync + 'static,
+    ) -> Self {
         let (jobs, todo) = channel();
         let (send, events) = channel();
-        let mut work = Work { renderer, model: None, surfaces: HashMap::new(), light: None };
+        let (bakes, to_bake) = channel::<Bake>();
+        let common = Arc::new(Common::default());
+
+        let (results, shared, waker) = (jobs.clone(), common.clone(), wake.clone());
         std::thread::spawn(move || {
+            while let Ok((number, scene, mips)) = to_bake.recv() {
+                if shared.model.load(Relaxed) != number {
+                    continue;
+                }
+                let name = format!("baking {}", mips.name());
+                shared.set_baking(Some((name.clone(), 0.0)));
+                waker();
+                let watching = shared.clone();
+                let progress =
+                    Progress::watched(move |_, share| watching.set_baking(Some((name.clone(), share))));
+                let surfaces = scene_surfaces(&scene, mips, &progress).map(|(surfaces, _)| surfaces);
+                shared.set_baking(None);
+                if results.send(Job::Baked(number, mips, surfaces)).is_err() {
+                    return;
+                }
+            }
+        });
+
+        let mut work = Work {
+            renderer,
+            common: common.clone(),
+            bakes,
+            model: None,
+            surfaces: HashMap::new(),
+            light: None,
+        };
+        let reader = std::thread::spawn(move || {
             let tell = |event| {
                 // A window that is gone hears nothing.
                 let sent = send.send(event);
@@ -68,6 +135,9 @@ impl Loader {
                 sent.is_ok()
             };
             while let Ok(job) = todo.recv() {
+                if work.common.closing.load(Relaxed) {
+                    return;
+                }
                 let _ = tell(Event::Busy(work.describe(&job)));
                 let heard = match work.run(job) {
                     Ok(events) => events.into_iter().all(tell),
@@ -78,26 +148,47 @@ impl Loader {
                 }
             }
         });
-        Self { jobs, events }
+        Self { jobs: Some(jobs), events, common, reader: Some(reader) }
     }
 
     /// Asks for something.
     pub(super) fn ask(&self, job: Job) {
-        // The thread ends only with the window.
-        let _ = self.jobs.send(job);
+        if let Some(jobs) = &self.jobs {
+            // The thread ends only with the window.
+            let _ = jobs.send(job);
+        }
     }
 
     /// The next event, if there is one.
     pub(super) fn event(&self) -> Option<Event> {
         self.events.try_recv().ok()
     }
+
+    /// What is being baked.
+    pub(super) fn baking(&self) -> Baking {
+        self.common.baking.lock().expect("no thread panics").clone()
+    }
+
+    /// Ends the thread that uses the device and waits for it. A bake, which does not use it, ends with the process.
+    pub(super) fn close(&mut self) {
+        self.common.closing.store(true, Relaxed);
+        // A job that does nothing, in case it waits for one.
+        self.ask(Job::Bake(Mips::Level0));
+        self.jobs = None;
+        if let Some(reader) = self.reader.take() {
+            // It has said what went wrong.
+            let _ = reader.join();
+        }
+    }
 }
 
 struct Work {
     renderer: Arc<RwLock<Realtime>>,
-    model: Option<(Scene, RenderScene)>,
+    common: Arc<Common>,
+    bakes: Sender<Bake>,
+    model: Option<(Arc<Scene>, RenderScene)>,
     /// Textures of the model that were baked.
-    surfaces: HashMap<Mips, Vec<Option<SurfaceTextures>>>,
+    surfaces: HashMap<Mips, Surfaces>,
     /// The model's light on the device.
     light: Option<GpuLight>,
 }
@@ -106,8 +197,8 @@ impl Work {
     fn describe(&self, job: &Job) -> String {
         match job {
             Job::Open(path, _) => format!("reading {}", path.display()),
-            Job::Bake(mips) => format!("baking {}", mips.name()),
             Job::Light(..) => "filtering the environment".into(),
+            Job::Bake(_) | Job::Baked(..) => String::new(),
         }
     }
 
@@ -124,25 +215,35 @@ impl Work {
                     material_names: scene.materials.iter().map(|m| m.name.clone()).collect(),
                     scene: prepared.clone(),
                     warnings: scene.warnings.clone(),
+                    at: Instant::now(),
                 };
-                self.model = Some((scene, prepared));
+                self.model = Some((Arc::new(scene), prepared));
+                self.common.model.fetch_add(1, Relaxed);
                 self.surfaces.clear();
                 self.light = None;
                 Ok(vec![Event::Opened(Box::new(opened))])
             }
             Job::Bake(mips) => {
-                let Some((scene, prepared)) = &self.model else { return Ok(Vec::new()) };
-                if !self.surfaces.contains_key(&mips) {
+                let Some((scene, _)) = &self.model else { return Ok(Vec::new()) };
+                if self.surfaces.contains_key(&mips) {
+                    return self.bring(mips);
+                }
+                if mips == Mips::Level0 {
+                    // There is nothing to filter, so this is soon done.
                     let (surfaces, _) = scene_surfaces(scene, mips, &Progress::new(false))?;
                     self.surfaces.insert(mips, surfaces);
+                    return self.bring(mips);
                 }
-                let mut with_mips = prepared.clone();
-                for (material, surface) in with_mips.materials.iter_mut().zip(&self.surfaces[&mips]) {
-                    material.surface.clone_from(surface);
+                // The baker ends only with the process.
+                let _ = self.bakes.send((self.common.model.load(Relaxed), scene.clone(), mips));
+                Ok(Vec::new())
+            }
+            Job::Baked(number, mips, surfaces) => {
+                if self.common.model.load(Relaxed) != number {
+                    return Ok(Vec::new());
                 }
-                let renderer = self.renderer.read().map_err(|e| Error::Internal(e.to_string()))?;
-                let light = self.light.get_or_insert_with(|| renderer.light_of(&with_mips));
-                Ok(vec![Event::Baked(mips, Box::new(renderer.load(&with_mips, light)))])
+                self.surfaces.insert(mips, surfaces?);
+                self.bring(mips)
             }
             Job::Light(choice, rotation) => {
                 let surroundings = environment(&choice, rotation)?.map(Surroundings::new).map(Arc::new);
@@ -153,6 +254,25 @@ impl Work {
                 Ok(vec![Event::LightChanged])
             }
         }
+    }
+
+    /// The model with the textures of a method, on the device.
+    fn bring(&mut self, mips: Mips) -> Result<Vec<Event>, Error> {
+        let Some((_, prepared)) = &self.model else { return Ok(Vec::new()) };
+        let mut with_mips = prepared.clone();
+        for (material, surface) in with_mips.materials.iter_mut().zip(&self.surfaces[&mips]) {
+            material.surface.clone_from(surface);
+        }
+        let filtering = match mips {
+            Mips::Level0 => TextureFiltering::Level0,
+            Mips::Filtered(_) => TextureFiltering::Mips { max_anisotropy: 16 },
+        };
+        let renderer = self.renderer.read().map_err(|e| Error::Internal(e.to_string()))?;
+        if self.common.closing.load(Relaxed) {
+            return Ok(Vec::new());
+        }
+        let light = self.light.get_or_insert_with(|| renderer.light_of(&with_mips));
+        Ok(vec![Event::Baked(mips, Box::new(renderer.load(&with_mips, light, filtering)))])
     }
 }
 

@@ -1,6 +1,9 @@
 //! The controls at the side of the window.
 
+use std::time::Duration;
+
 use eframe::egui::{self, Slider, Ui};
+use kinran_scene::{AlphaMode, Light, LightKind};
 
 use kinran_shading::skin::lighting::SKIN_NORMAL_BLUR;
 
@@ -24,10 +27,15 @@ pub(super) struct Shown<'a> {
     pub(super) material_names: &'a [String],
     /// Whether each material has baked normals and roughness.
     pub(super) mapped: &'a [bool],
+    /// What alpha does in each material.
+    pub(super) alpha_modes: &'a [AlphaMode],
+    /// The file's lights.
+    pub(super) lights: &'a [Light],
     /// Methods that are baked.
     pub(super) baked: &'a [Mips],
     pub(super) frames: u32,
     pub(super) frames_wanted: u32,
+    pub(super) first_picture: Option<Duration>,
 }
 
 fn method(ui: &mut Ui, label: &str, chosen: &mut usize, baked: &[Mips]) {
@@ -43,7 +51,10 @@ fn method(ui: &mut Ui, label: &str, chosen: &mut usize, baked: &[Mips]) {
 pub(super) fn panel(ui: &mut Ui, p: &mut Parameters, selected: &mut usize, shown: &Shown) -> Wishes {
     let mut wishes = Wishes::default();
     ui.heading(std::path::Path::new(shown.name).file_name().unwrap_or_default().to_string_lossy());
-    ui.weak(format!("{} of {} frames", shown.frames, shown.frames_wanted));
+    let opened = shown
+        .first_picture
+        .map_or_else(String::new, |time| format!(", the first {:.1} s after reading", time.as_secs_f32()));
+    ui.weak(format!("{} of {} frames{opened}", shown.frames, shown.frames_wanted));
     ui.horizontal(|ui| {
         wishes.frame_model = ui.button("Frame").on_hover_text("F").clicked();
         wishes.save_picture = ui.button("Save picture").on_hover_text("P").clicked();
@@ -100,7 +111,21 @@ pub(super) fn panel(ui: &mut Ui, p: &mut Parameters, selected: &mut usize, shown
             ui.add(Slider::new(&mut p.environment_rotation, -180.0..=180.0).text("rotation").suffix("°"));
         wishes.light |= turned.drag_stopped() || turned.lost_focus();
         ui.checkbox(&mut p.background, "environment behind the model");
-        ui.checkbox(&mut p.own_lights, "the file's lights");
+        if !shown.lights.is_empty() {
+            ui.checkbox(&mut p.own_lights, "the file's lights");
+            ui.add_enabled_ui(p.own_lights, |ui| {
+                for (i, (light, intensity)) in shown.lights.iter().zip(&mut p.intensities).enumerate() {
+                    let (kind, unit) = match light.kind {
+                        LightKind::Directional => ("directional", " lx"),
+                        LightKind::Point => ("point", " cd"),
+                        LightKind::Spot { .. } => ("spot", " cd"),
+                    };
+                    let most = (10.0 * light.color.max_element()).max(1.0);
+                    let slider = Slider::new(intensity, 0.0..=most).logarithmic(true).suffix(unit);
+                    ui.add(slider.text(format!("{i}: {kind}")));
+                }
+            });
+        }
         ui.checkbox(&mut p.sun.on, "directional light");
         ui.add_enabled_ui(p.sun.on, |ui| {
             ui.add(Slider::new(&mut p.sun.azimuth, -180.0..=180.0).text("azimuth").suffix("°"));
@@ -109,7 +134,7 @@ pub(super) fn panel(ui: &mut Ui, p: &mut Parameters, selected: &mut usize, shown
                 Slider::new(&mut p.sun.lux, 0.0..=100.0).text("illuminance").suffix(" lx").logarithmic(true),
             );
         });
-        ui.checkbox(&mut p.shadows, "shadows");
+        ui.checkbox(&mut p.shadows, "shadows of the first directional light");
     });
 
     egui::CollapsingHeader::new("Material").default_open(true).show(ui, |ui| {
@@ -137,14 +162,28 @@ pub(super) fn panel(ui: &mut Ui, p: &mut Parameters, selected: &mut usize, shown
         let (range, text) =
             if mapped { (0.0..=4.0, "roughness, × the map") } else { (0.0..=1.0, "perceptual roughness") };
         ui.add(Slider::new(&mut m.roughness, range).text(text));
-        ui.add(Slider::new(&mut m.anisotropy, 0.0..=3.0).text("anisotropy (exponent of αt/αb)"));
+        ui.add(Slider::new(&mut m.anisotropy, 0.0..=3.0).text("anisotropy, exponent of αt/αb"));
         ui.add(Slider::new(&mut m.rotation, -90.0..=90.0).text("rotation").suffix("°"));
-        ui.add(Slider::new(&mut m.normal_scale, 0.0..=4.0).text("normal scale"));
+        ui.add(Slider::new(&mut m.normal_scale, 0.0..=4.0).text("normal scale, ×"));
         ui.add(Slider::new(&mut m.occlusion, 0.0..=1.0).text("occlusion strength"));
+        match shown.alpha_modes.get(*selected) {
+            Some(AlphaMode::Mask { .. }) => {
+                ui.add(Slider::new(&mut m.opacity, 0.0..=1.0).text("alpha, × the map"));
+                ui.add(Slider::new(&mut m.alpha_cutoff, 0.0..=1.0).text("alpha cutoff"));
+            }
+            Some(AlphaMode::Blend) => {
+                ui.add(Slider::new(&mut m.opacity, 0.0..=1.0).text("opacity, × the map"));
+            }
+            _ => {}
+        }
         m.fuzz.sliders(ui);
         ui.horizontal(|ui| {
             ui.color_edit_button_rgb(&mut m.emissive);
-            ui.label("emitted (linear)");
+            ui.add(Slider::new(&mut m.emission, 0.0..=100.0).logarithmic(true).text("emitted radiance"));
+        });
+        ui.horizontal(|ui| {
+            ui.color_edit_button_rgb(&mut m.translucent_color);
+            ui.add(Slider::new(&mut m.translucency, 0.0..=1.0).text("scattered through"));
         });
         if let Some(skin) = &mut m.skin {
             ui.horizontal(|ui| {
@@ -168,7 +207,7 @@ pub(super) fn panel(ui: &mut Ui, p: &mut Parameters, selected: &mut usize, shown
 }
 
 /// Keys and what they do, for the help and nowhere else.
-pub(super) const KEYS: [(&str, &str); 12] = [
+pub(super) const KEYS: [(&str, &str); 14] = [
     ("drag", "turn"),
     ("right drag", "move"),
     ("wheel", "nearer, farther"),
@@ -180,5 +219,7 @@ pub(super) const KEYS: [(&str, &str); 12] = [
     ("P", "save a picture beside the model"),
     ("Ctrl+S", "save all parameters beside the model"),
     ("R", "read the shaders again"),
+    ("Esc", "close messages and this help"),
+    ("Ctrl+Q", "close the window"),
     ("?", "these keys"),
 ];

@@ -6,9 +6,9 @@ use glam::Vec3;
 use kinran_bake::aniso::Filter;
 use kinran_image::write_atomically;
 use kinran_render::realtime::{Adjustment, Channel};
-use kinran_render::reference::{RenderSkin, SkinCurvature};
+use kinran_render::reference::{RenderMaterial, RenderSkin, SkinCurvature, Translucency};
 use kinran_render::tonemap::Tonemap;
-use kinran_scene::{Light, LightKind};
+use kinran_scene::{AlphaMode, Light, LightKind};
 use kinran_shading::ALPHA_MIN;
 use serde::{Deserialize, Serialize};
 
@@ -59,10 +59,19 @@ pub(super) struct MaterialParameters {
     /// Degrees.
     pub(super) rotation: f32,
     pub(super) normal_scale: f32,
+    /// Colour of what is emitted, and its strength.
     pub(super) emissive: [f32; 3],
+    pub(super) emission: f32,
     pub(super) occlusion: f32,
     #[serde(default)]
     pub(super) fuzz: FuzzParameters,
+    /// Alpha, which matters to materials that are masked or blended.
+    pub(super) opacity: f32,
+    /// Alpha below it is a hole in a masked material.
+    pub(super) alpha_cutoff: f32,
+    /// Share of the scattered light that comes out on the other side, and its colour.
+    pub(super) translucency: f32,
+    pub(super) translucent_color: [f32; 3],
     /// Where the material is skin.
     #[serde(default)]
     pub(super) skin: Option<SkinParameters>,
@@ -100,6 +109,51 @@ impl SkinParameters {
 }
 
 impl MaterialParameters {
+    /// What a material says before anything is turned.
+    pub(super) fn authored(m: &RenderMaterial) -> Self {
+        let emission = m.emissive_factor.max_element();
+        let translucency = m.translucency.as_ref();
+        Self {
+            base_color: m.base_color_factor.truncate().to_array(),
+            metallic: m.metallic_factor,
+            roughness: m.roughness_factor,
+            anisotropy: 1.0,
+            rotation: 0.0,
+            normal_scale: 1.0,
+            emissive: if emission > 0.0 { (m.emissive_factor / emission).to_array() } else { [1.0; 3] },
+            emission,
+            occlusion: m.occlusion_strength,
+            fuzz: FuzzParameters::from(&m.fuzz),
+            skin: m.skin.as_ref().map(SkinParameters::of),
+            opacity: m.base_color_factor.w,
+            alpha_cutoff: match m.alpha_mode {
+                AlphaMode::Mask { cutoff } => cutoff,
+                _ => 0.5,
+            },
+            translucency: translucency.map_or(0.0, |t| t.factor),
+            translucent_color: translucency
+                .map_or(m.base_color_factor.truncate(), |t| t.color_factor)
+                .to_array(),
+        }
+    }
+
+    /// Writes the factors into a material; its textures stay.
+    pub(super) fn apply(&self, m: &mut RenderMaterial) {
+        m.base_color_factor = Vec3::from(self.base_color).extend(self.opacity);
+        m.metallic_factor = self.metallic;
+        m.roughness_factor = self.roughness;
+        m.emissive_factor = self.emission * Vec3::from(self.emissive);
+        m.occlusion_strength = self.occlusion;
+        if let AlphaMode::Mask { cutoff } = &mut m.alpha_mode {
+            *cutoff = self.alpha_cutoff;
+        }
+        if m.translucency.is_some() || self.translucency > 0.0 {
+            let (map, color) = m.translucency.take().map_or((None, None), |t| (t.map, t.color));
+            let color_factor = Vec3::from(self.translucent_color);
+            m.translucency = Some(Translucency { factor: self.translucency, map, color_factor, color });
+        }
+    }
+
     pub(super) fn adjustment(&self, mapped: bool) -> Adjustment {
         // The factor of an unmapped material is its roughness itself; alpha goes with the square.
         let roughness = if mapped { self.roughness * self.roughness } else { 1.0 };
@@ -162,6 +216,8 @@ pub(super) struct Parameters {
     pub(super) background: bool,
     /// The file's own lights shine.
     pub(super) own_lights: bool,
+    /// Their intensities, candela or lux; empty until a model is loaded.
+    pub(super) intensities: Vec<f32>,
     pub(super) sun: Sun,
     pub(super) shadows: bool,
     pub(super) all_deferred: bool,
@@ -195,6 +251,7 @@ impl Parameters {
             environment_rotation: view.env_rotation,
             background: matches!(view.env, EnvironmentChoice::File(_)),
             own_lights: view.light.is_empty(),
+            intensities: Vec::new(),
             sun: Sun {
                 on: !view.light.is_empty() || view.env == EnvironmentChoice::None,
                 azimuth: towards.x.atan2(towards.z).to_degrees(),
