@@ -279,13 +279,18 @@ impl Drop for WorkFolder {
     }
 }
 
+/// Removes folders and locks whose owner is gone. A process may die with either of the two alone: its folder has become
+/// an entry, or is removed first.
 fn remove_abandoned(work: &Path) -> io::Result<()> {
     for entry in fs::read_dir(work)? {
-        let folder = entry?.path();
-        if !folder.is_dir() {
+        let path = entry?.path();
+        let (folder, lock_path) = if path.is_dir() {
+            (path.clone(), path.with_extension("lock"))
+        } else if path.extension().is_some_and(|extension| extension == "lock") {
+            (path.with_extension(""), path)
+        } else {
             continue;
-        }
-        let lock_path = folder.with_extension("lock");
+        };
         let owned = match File::options().write(true).open(&lock_path) {
             Ok(lock) => lock.try_lock().is_err(),
             Err(_) => false,

@@ -41,9 +41,8 @@ pub(crate) fn check_folder(path: &Path) -> Result<(), Error> {
 }
 
 fn check_writable(folder: &Path) -> Result<(), Error> {
-    tempfile::Builder::new()
-        .prefix(".kinran-")
-        .tempfile_in(folder)
+    // A file without a name: a process that is killed here leaves nothing behind.
+    tempfile::tempfile_in(folder)
         .map(drop)
         // The error itself would name the temporary file.
         .map_err(|e| kinran_image::Error::io(folder, e.kind().into()).into())

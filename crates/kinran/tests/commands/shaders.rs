@@ -2,7 +2,29 @@
 
 use crate::common::{files, kinran, kinran_json, refused, text};
 
-const MODULES: [&str; 8] = ["aniso", "beckmann", "frame", "ggx", "multiscatter", "sggx", "sh", "sym"];
+const MODULES: [&str; 21] = [
+    "aniso",
+    "beckmann",
+    "detail_hsv",
+    "detail_layer",
+    "detail_normal",
+    "detail_over",
+    "detail_overlay",
+    "frame",
+    "fuzz_ambient",
+    "fuzz_deferred",
+    "fuzz_layer",
+    "fuzz_p_s",
+    "fuzz_phase",
+    "fuzz_sampling",
+    "ggx",
+    "multiscatter",
+    "sggx",
+    "sh",
+    "skin_curvature",
+    "skin_lighting",
+    "sym",
+];
 
 #[test]
 fn every_language_comes_as_a_folder_that_says_what_the_crate_says() {
