@@ -149,7 +149,10 @@ float overlay(float s, float d) {
 ///
 /// Cost on GCN: 21 instructions.
 vec3 overlay_color(vec3 s, vec3 d) {
-    return mix((vec3(1.0) - ((2.0 * (vec3(1.0) - s)) * (vec3(1.0) - d))), ((2.0 * s) * d), lessThan(s, vec3(0.5)));
+    float _e4 = overlay(s.x, d.x);
+    float _e7 = overlay(s.y, d.y);
+    float _e10 = overlay(s.z, d.z);
+    return vec3(_e4, _e7, _e10);
 }
 
 /// The talk's smooth overlay, finer near `t = d` where a dark detail is brightened (slide: Detail Maps | Blending): as
@@ -168,11 +171,10 @@ float smooth_overlay(float s, float d) {
 ///
 /// Cost on GCN: 39 instructions.
 vec3 smooth_overlay_color(vec3 s, vec3 d) {
-    vec3 x = (2.0 * s) - vec3(1.0);
-    vec3 low = (2.0 * s) * d;
-    vec3 bright = vec3(1.0) - ((2.0 * (vec3(1.0) - s)) * (vec3(1.0) - d));
-    vec3 dark = low + (((s - low) * x) * x);
-    return mix(mix(bright, dark, lessThan(d, vec3(0.5))), low, lessThan(s, vec3(0.5)));
+    float _e4 = smooth_overlay(s.x, d.x);
+    float _e7 = smooth_overlay(s.y, d.y);
+    float _e10 = smooth_overlay(s.z, d.z);
+    return vec3(_e4, _e7, _e10);
 }
 
 #endif

@@ -159,7 +159,10 @@ float overlay(float s, float d)
 /// Cost on GCN: 21 instructions.
 float3 overlay_color(float3 s, float3 d)
 {
-    return (s < (0.5).xxx) ? ((2.0 * s) * d) : ((1.0).xxx - ((2.0 * ((1.0).xxx - s)) * ((1.0).xxx - d)));
+    const float _e4 = overlay(s.x, d.x);
+    const float _e7 = overlay(s.y, d.y);
+    const float _e10 = overlay(s.z, d.z);
+    return float3(_e4, _e7, _e10);
 }
 
 /// The talk's smooth overlay, finer near `t = d` where a dark detail is brightened (slide: Detail Maps | Blending): as
@@ -180,11 +183,10 @@ float smooth_overlay(float s, float d)
 /// Cost on GCN: 39 instructions.
 float3 smooth_overlay_color(float3 s, float3 d)
 {
-    float3 x = (2.0 * s) - (1.0).xxx;
-    float3 low = (2.0 * s) * d;
-    float3 bright = (1.0).xxx - ((2.0 * ((1.0).xxx - s)) * ((1.0).xxx - d));
-    float3 dark = low + (((s - low) * x) * x);
-    return (s < (0.5).xxx) ? low : ((d < (0.5).xxx) ? dark : bright);
+    const float _e4 = smooth_overlay(s.x, d.x);
+    const float _e7 = smooth_overlay(s.y, d.y);
+    const float _e10 = smooth_overlay(s.z, d.z);
+    return float3(_e4, _e7, _e10);
 }
 
 #endif

@@ -187,7 +187,10 @@ inline metal::float3 overlay_color(
     metal::float3 s,
     metal::float3 d
 ) {
-    return metal::select(metal::float3(1.0) - ((2.0 * (metal::float3(1.0) - s)) * (metal::float3(1.0) - d)), (2.0 * s) * d, s < metal::float3(0.5));
+    float _e4 = overlay(s.x, d.x);
+    float _e7 = overlay(s.y, d.y);
+    float _e10 = overlay(s.z, d.z);
+    return metal::float3(_e4, _e7, _e10);
 }
 
 /// The talk's smooth overlay, finer near `t = d` where a dark detail is brightened (slide: Detail Maps | Blending): as
@@ -212,11 +215,10 @@ inline metal::float3 smooth_overlay_color(
     metal::float3 s,
     metal::float3 d
 ) {
-    metal::float3 x = (2.0 * s) - metal::float3(1.0);
-    metal::float3 low = (2.0 * s) * d;
-    metal::float3 bright = metal::float3(1.0) - ((2.0 * (metal::float3(1.0) - s)) * (metal::float3(1.0) - d));
-    metal::float3 dark = low + (((s - low) * x) * x);
-    return metal::select(metal::select(bright, dark, d < metal::float3(0.5)), low, s < metal::float3(0.5));
+    float _e4 = smooth_overlay(s.x, d.x);
+    float _e7 = smooth_overlay(s.y, d.y);
+    float _e10 = smooth_overlay(s.z, d.z);
+    return metal::float3(_e4, _e7, _e10);
 }
 
 #endif

@@ -129,7 +129,7 @@ fn overlay(s: f32, d: f32) -> f32 {
 ///
 /// Cost on GCN: 21 instructions.
 fn overlay_color(s: vec3f, d: vec3f) -> vec3f {
-    return select(1.0 - 2.0 * (1.0 - s) * (1.0 - d), 2.0 * s * d, s < vec3f(0.5));
+    return vec3f(overlay(s.x, d.x), overlay(s.y, d.y), overlay(s.z, d.z));
 }
 
 /// The talk's smooth overlay, finer near `t = d` where a dark detail is brightened (slide: Detail Maps | Blending): as
@@ -148,11 +148,7 @@ fn smooth_overlay(s: f32, d: f32) -> f32 {
 ///
 /// Cost on GCN: 39 instructions.
 fn smooth_overlay_color(s: vec3f, d: vec3f) -> vec3f {
-    let x = 2.0 * s - 1.0;
-    let low = 2.0 * s * d;
-    let bright = 1.0 - 2.0 * (1.0 - s) * (1.0 - d);
-    let dark = low + (s - low) * x * x;
-    return select(select(bright, dark, d < vec3f(0.5)), low, s < vec3f(0.5));
+    return vec3f(smooth_overlay(s.x, d.x), smooth_overlay(s.y, d.y), smooth_overlay(s.z, d.z));
 }
 
 // Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
