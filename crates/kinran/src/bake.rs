@@ -349,7 +349,7 @@ impl Args {
 /// # Errors
 /// Whatever is wrong with the input, the flags or the output folder; nothing half-written stays.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    if args.input.is_file() && has_extension(&args.input, "toml") {
+    if !args.input.is_dir() && has_extension(&args.input, "toml") {
         return bake_library(args, console);
     }
     if args.library != LibraryArgs::default() {
