@@ -41,7 +41,7 @@ fn light(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     let view = normalize(frame.camera.xyz - surface.position);
     let lobe = lobe_of(surface, view);
     surface.fuzz = fuzz_simple(fuzziness_from_code(base.a * 255.0), surface.normal, view, lobe.diffuse);
-    var sum = ambient(surface, lobe, 1u);
+    var sum = ambient(surface, lobe);
     for (var i = 0u; i < frame.counts.x; i++) {
         let light = frame.lights[i];
         let incoming = incident(light, surface.position);

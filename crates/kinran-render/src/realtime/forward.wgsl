@@ -5,7 +5,7 @@ fn lit(surface: Surface, lobe: Lobe, skin: Skin) -> vec3f {
     if skin.kind > 0u {
         around.diffuse = vec3f(0.0);
     }
-    var sum = surface.emitted + ambient(surface, around, 8u);
+    var sum = surface.emitted + ambient(surface, around);
     if skin.kind > 0u {
         sum += skin_ambient(skin, surface, lobe.diffuse);
     }

@@ -25,7 +25,7 @@ struct Frame {
     background: vec4f,
     // Irradiance of the environment.
     irradiance: array<vec4f, 9>,
-    // x lights, y levels of the probe (0: no environment), z the channel shown, w the frame.
+    // x lights, y 1: there is an environment, z the channel shown, w the frame.
     counts: vec4u,
     // xy size in pixels, z exposure factor, w tone curve.
     display: vec4f,
@@ -34,12 +34,11 @@ struct Frame {
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var environment_map: texture_2d<f32>;
-@group(0) @binding(2) var probe_map: texture_2d<f32>;
-@group(0) @binding(3) var albedo_map: texture_2d<f32>;
-@group(0) @binding(4) var shadow_map: texture_depth_2d;
-@group(0) @binding(5) var around_sampler: sampler;
-@group(0) @binding(6) var clamp_sampler: sampler;
-@group(0) @binding(7) var shadow_sampler: sampler_comparison;
+@group(0) @binding(2) var albedo_map: texture_2d<f32>;
+@group(0) @binding(3) var shadow_map: texture_depth_2d;
+@group(0) @binding(4) var around_sampler: sampler;
+@group(0) @binding(5) var clamp_sampler: sampler;
+@group(0) @binding(6) var shadow_sampler: sampler_comparison;
 
 // Texture coordinates of a direction in an equirectangular image: the centre is -z, +y the top row.
 fn equirectangular(direction: vec3f) -> vec2f {
@@ -47,10 +46,14 @@ fn equirectangular(direction: vec3f) -> vec2f {
     return vec2f(u, acos(clamp(direction.y, -1.0, 1.0)) / PI);
 }
 
-// The environment in a GGX lobe of perceptual roughness `roughness` about `direction`.
-fn probe(direction: vec3f, roughness: f32) -> vec3f {
-    let level = roughness * f32(frame.counts.y - 1u);
-    return textureSampleLevel(probe_map, around_sampler, equirectangular(direction), level).rgb;
+// The environment's mean radiance over `solid_angle` about `direction`.
+fn probe(direction: vec3f, solid_angle: f32) -> vec3f {
+    let size = vec2f(textureDimensions(environment_map));
+    // Rows narrow towards the poles, the last one to the sine of half a row.
+    let narrowing = max(sqrt(saturate(1.0 - direction.y * direction.y)), 0.5 * PI / size.y);
+    let texel = 2.0 * PI * PI / (size.x * size.y) * narrowing;
+    let level = 0.5 * log2(solid_angle / texel);
+    return textureSampleLevel(environment_map, around_sampler, equirectangular(direction), level).rgb;
 }
 
 fn background(direction: vec3f) -> vec3f {

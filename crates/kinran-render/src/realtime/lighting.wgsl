@@ -142,11 +142,14 @@ fn specular_isotropic(surface: Surface, lobe: Lobe, u: vec3f) -> vec3f {
     return d * visibility * schlick_f(lobe.base_reflectance, dot(lobe.v, h)) * lobe.compensation;
 }
 
-// Light from all around, diffuse by spherical harmonics, specular by a fan of probe lookups: `taps` quantiles of the
-// lobe's slopes along its rougher direction, which are Student-t distributed, weighted as visible normals are. Across,
-// given a slope, they are Student-t too, wider where the slope is steep; the probe's round lobe of the same quartiles
-// stands for that. Frames shift the quantiles, so that their mean is a continuous fan.
-fn ambient(surface: Surface, lobe: Lobe, taps: u32) -> vec3f {
+// Lookups of the environment for a pixel's reflection; chosen by eye, half as many show a single frame's taps.
+const TAPS: u32 = 8u;
+
+// Light from all around, diffuse by spherical harmonics, specular by visible normals of the lobe, each reflecting the
+// environment filtered to its share of the lobe (Krivanek, Colbert 2008). One frame's taps cover the lobe, so that it is
+// smooth by itself; the n-th frame's are as narrow as those of n frames need be, so that their mean goes to the lobe's
+// own. Taps come in pairs half a turn apart: a tangent that turns round at a seam of the mesh changes nothing.
+fn ambient(surface: Surface, lobe: Lobe) -> vec3f {
     if frame.counts.y == 0u {
         return vec3f(0.0);
     }
@@ -162,28 +165,26 @@ fn ambient(surface: Surface, lobe: Lobe, taps: u32) -> vec3f {
         return surface.occlusion * diffuse;
     }
 
-    // 0 where the lobe is round, towards 1 where it is a line.
-    let ratio = surface.alpha_b / surface.alpha_t;
-    let stretch_sqr = saturate(1.0 - ratio * ratio);
-    let spread = surface.alpha_t * sqrt(stretch_sqr);
-    let count = select(taps, 1u, stretch_sqr < 0.01);
-    let shift = select(fract(0.5 + f32(frame.counts.w) * 0.618034), 0.5, count == 1u);
     let to_world = mat3x3f(surface.tangent, surface.bitangent, surface.normal);
+    let share = 1.0 / f32(TAPS * (frame.counts.w + 1u));
     var sum = vec3f(0.0);
-    var weights = 0.0;
-    for (var i = 0u; i < count; i++) {
-        let p = 2.0 * (f32(i) + shift) / f32(count) - 1.0;
-        let quantile = p * inverseSqrt(max(1.0 - p * p, 1e-4));
-        let h = normalize(vec3f(-spread * quantile, 0.0, 1.0));
+    var weights = vec3f(0.0);
+    for (var i = 0u; i < TAPS; i++) {
+        // The R2 sequence (Roberts 2018).
+        let pair = f32((frame.counts.w * TAPS + i) / 2u);
+        let xi = fract(0.5 + pair * vec2f(0.75487766, 0.56984029) + vec2f(0.5 * f32(i & 1u), 0.0));
+        let h = ggx_vndf_sample(lobe.v, surface.alpha_t, surface.alpha_b, xi);
         let v_h = dot(lobe.v, h);
         let u = 2.0 * v_h * h - lobe.v;
-        let weight = max(v_h, 0.0) / h.z * saturate(u.z * 16.0 + 0.5);
-        let alpha = min(surface.alpha_b * mix(1.0, 0.765 * sqrt(1.0 + quantile * quantile), stretch_sqr), 1.0);
-        // A rough lobe leans from the mirror direction towards its normal (Lagarde, de Rousiers 2014).
-        let lean = (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha);
-        sum += weight * probe(normalize(to_world * mix(h, u, lean)), sqrt(alpha));
+        if u.z <= 0.0 {
+            continue;
+        }
+        let density = ggx_vndf_pdf(lobe.v, h, surface.alpha_t, surface.alpha_b) / (4.0 * v_h);
+        let passed = smith_aniso_v(u, lobe.v, surface.alpha_t, surface.alpha_b) * u.z;
+        let weight = passed * schlick_f(lobe.base_reflectance, v_h);
+        sum += weight * probe(to_world * u, share / density);
         weights += weight;
     }
-    let specular = sum / max(weights, 1e-6) * lobe.albedo;
+    let specular = sum / max(weights, vec3f(1e-9)) * lobe.albedo;
     return surface.occlusion * fuzz_over_ambient(surface.fuzz, diffuse, specular, coefficients);
 }

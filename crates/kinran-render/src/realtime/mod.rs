@@ -396,8 +396,8 @@ impl Realtime {
         let irradiance = scene.surroundings.as_ref().map(|s| s.irradiance).unwrap_or_default();
         floats.extend(irradiance.iter().flat_map(|c| c.extend(0.0).to_array()));
         let lights = &scene.lights[..scene.lights.len().min(MAX_LIGHTS)];
-        let levels = if scene.surroundings.is_some() { probe::LEVELS as u32 } else { 0 };
-        let counts = [lights.len() as u32, levels, settings.channel as u32, target.frames];
+        let surrounded = u32::from(scene.surroundings.is_some());
+        let counts = [lights.len() as u32, surrounded, settings.channel as u32, target.frames];
         floats.extend(counts.map(f32::from_bits));
         let curve = match settings.tonemap {
             Tonemap::None => 0.0,
@@ -442,7 +442,6 @@ impl Realtime {
         let resources = [
             self.frame.as_entire_binding(),
             TextureView(&scene.light.environment),
-            TextureView(&scene.light.probe),
             TextureView(&self.albedo),
             TextureView(&self.shadow_map),
             Sampler(&self.around),
@@ -624,7 +623,6 @@ impl Layouts {
         Layouts {
             frame: layout(&[
                 uniform,
-                filtered,
                 filtered,
                 filtered,
                 texture(T::Depth),

@@ -160,26 +160,19 @@ impl GpuScene {
 /// Light from all around on the GPU; cloning shares it.
 #[derive(Clone)]
 pub struct GpuLight {
-    /// As it is.
+    /// With all mips.
     pub(super) environment: wgpu::TextureView,
-    /// In lobes.
-    pub(super) probe: wgpu::TextureView,
 }
 
 impl GpuLight {
     pub(super) fn new(gpu: &Gpu, surroundings: Option<&Surroundings>) -> Self {
         let Some(surroundings) = surroundings else {
             let environment = float_texture(gpu, (1, 1), &half_levels(&[vec![Vec3::ZERO]]));
-            return Self { probe: environment.clone(), environment };
+            return Self { environment };
         };
         let environment = &surroundings.environment;
-        let (width, height) = (environment.width(), environment.height());
-        let texels = (0..height).flat_map(|y| (0..width).map(move |x| environment.texel(x, y))).collect();
-        let rows = probe::height(environment) as u32;
-        Self {
-            environment: float_texture(gpu, (width as u32, height as u32), &half_levels(&[texels])),
-            probe: float_texture(gpu, (2 * rows, rows), &half_levels(&probe::prefilter(environment))),
-        }
+        let size = (environment.width() as u32, environment.height() as u32);
+        Self { environment: float_texture(gpu, size, &half_levels(&probe::levels(environment))) }
     }
 }
 
