@@ -80,7 +80,7 @@ fn scenes() -> Vec<(&'static str, RenderScene)> {
         let environment = environment.then(Environment::studio);
         let mut scene = RenderScene::new(&scene, vec![None], environment).expect("one material");
         if forward {
-            scene.materials[0].surface = Some(SurfaceTextures { normal: texture(), aniso: texture() });
+            scene.materials[0].surface = Some(SurfaceTextures::new(texture(), texture()));
         }
         scene
     };

@@ -85,7 +85,7 @@ fn shaded_samples(bencher: Bencher<'_, '_>, what: &str) {
     if environment.is_some() {
         scene.lights.clear();
     }
-    let surface = SurfaceTextures { normal: texture(), aniso: texture() };
+    let surface = SurfaceTextures::new(texture(), texture());
     let scene = RenderScene::new(&scene, vec![Some(surface)], environment).expect("one material");
     let settings = Settings {
         width: SIZE,

@@ -55,7 +55,7 @@ fn anisotropy(scene: &Scene, material: &Material, sense: f32) -> Option<SurfaceT
             )
         }
     };
-    Some(SurfaceTextures { normal: BoundTexture::constant([0.5, 0.5, 0.0, 1.0]), aniso })
+    Some(SurfaceTextures::new(BoundTexture::constant([0.5, 0.5, 0.0, 1.0]), aniso))
 }
 
 const PIXELS_PER_UNIT: f32 = 48.0;
@@ -139,7 +139,7 @@ fn the_normal_tangent_test_s_mapped_bumps_look_like_its_modelled_ones() {
         let level = MipLevel { texels, ..texture.levels[0].clone() };
         let normal = MipTexture { levels: vec![level], wrap: place.wrap, encoded: None };
         let aniso = BoundTexture::constant([0.2, 0.5, 0.2, 1.0]);
-        SurfaceTextures { normal: BoundTexture::new(Arc::new(normal), &place), aniso }
+        SurfaceTextures::new(BoundTexture::new(Arc::new(normal), &place), aniso)
     };
     let environment = || Environment::from_fn(64, |d| vec3(0.2 + d.x, 0.2 + d.y, 0.2 - d.y).max(Vec3::ZERO));
     let differences = |flip: f32| {

@@ -523,7 +523,7 @@ fn a_bump_is_bright_on_the_side_of_the_light() {
         scene.materials[0].double_sided = double_sided;
         scene.instances[0].transform = transform;
         scene.lights = vec![directional(-from, 1.0)];
-        let surface = SurfaceTextures { normal: bump(64, true), aniso: isotropic.clone() };
+        let surface = SurfaceTextures::new(bump(64, true), isotropic.clone());
         let prepared = RenderScene::new(&scene, vec![Some(surface)], None).unwrap();
         asymmetry(&draw(&prepared, camera, &settings(64, 4)))
     };
@@ -582,7 +582,7 @@ fn highlights_stretch_along_the_direction_of_larger_roughness() {
     for (degrees, mirror) in [(0.0f32, 1.0), (90.0, 1.0), (30.0, 1.0), (-55.0, 1.0), (30.0, -1.0)] {
         let axis = Vec2::from_angle(degrees.to_radians());
         let texel = aniso_encode(aniso_from_alphas(0.3, 0.05, axis)).extend(1.0).to_array();
-        let surface = SurfaceTextures { normal: flat.clone(), aniso: BoundTexture::constant(texel) };
+        let surface = SurfaceTextures::new(flat.clone(), BoundTexture::constant(texel));
         scene.instances[0].transform = Affine3A::from_scale(vec3(mirror, 1.0, 1.0));
         let prepared = RenderScene::new(&scene, vec![Some(surface)], None).unwrap();
         let (angle, ratio) = elongation(&draw(&prepared, &camera, &settings(96, 4)));
@@ -610,7 +610,7 @@ fn a_tilted_texel_s_matrix_is_read_in_the_shortest_arc_frame() {
         let h = h.normalize();
         let light = 2.0 * view.dot(h) * h - view;
         scene.lights = vec![directional(-light, 1.0)];
-        let surface = SurfaceTextures { normal: normal.clone(), aniso: BoundTexture::constant(texel) };
+        let surface = SurfaceTextures::new(normal.clone(), BoundTexture::constant(texel));
         let prepared = RenderScene::new(&scene, vec![Some(surface)], None).unwrap();
         let got = radiance_at_origin(&prepared, 3.0 * view, 1).y;
 
@@ -686,12 +686,8 @@ fn busy_scene() -> (RenderScene, Camera) {
     scene.instances[1].transform = Affine3A::from_translation(vec3(0.3, 0.2, 1.3));
     scene.lights = vec![directional(vec3(-0.5, -1.0, -0.6), 2.0)];
     let environment = Environment::from_fn(32, |d| vec3(0.5 + 0.5 * d.x, 0.5 + 0.4 * d.y, 1.0 + d.z));
-    let surface = SurfaceTextures {
-        normal: bump(32, true),
-        aniso: BoundTexture::constant(
-            aniso_encode(aniso_from_alphas(0.5, 0.1, Vec2::Y)).extend(1.0).to_array(),
-        ),
-    };
+    let texel = aniso_encode(aniso_from_alphas(0.5, 0.1, Vec2::Y)).extend(1.0).to_array();
+    let surface = SurfaceTextures::new(bump(32, true), BoundTexture::constant(texel));
     let prepared = RenderScene::new(&scene, vec![Some(surface), None], Some(environment)).unwrap();
     (prepared, look_at(vec3(0.5, 0.8, 4.0), Vec3::ZERO, Vec3::Y, 0.7))
 }
@@ -744,10 +740,8 @@ fn mips_and_ground_truth_agree_where_there_is_nothing_to_filter() {
         let texture = MipTexture { levels: levels.collect(), wrap: [Wrap::Mirror; 2], encoded: None };
         BoundTexture { texture: Arc::new(texture), uv_set: 0, transform: Mat3::IDENTITY }
     };
-    scene.materials[0].surface = Some(SurfaceTextures {
-        normal: constant(64, [0.6, 0.45, 0.0, 1.0]),
-        aniso: constant(64, [0.5, 0.6, 0.2, 1.0]),
-    });
+    scene.materials[0].surface =
+        Some(SurfaceTextures::new(constant(64, [0.6, 0.45, 0.0, 1.0]), constant(64, [0.5, 0.6, 0.2, 1.0])));
     scene.materials[0].base_color = Some(constant(16, [0.7, 0.3, 0.1, 1.0]));
     let with = |filtering| draw(&scene, &camera, &Settings { filtering, ..settings(48, 4) });
     let truth = with(TextureFiltering::Level0);
@@ -779,10 +773,10 @@ fn grazing_views_of_steep_reliefs_stay_finite() {
     // Normals on the horizon, seen from all around, even from below their own horizon.
     for angle in 0..16 {
         let d = Vec2::from_angle(angle as f32 * 0.4);
-        let surface = SurfaceTextures {
-            normal: BoundTexture::constant([0.5 + 0.5 * d.x, 0.5 + 0.5 * d.y, 0.0, 1.0]),
-            aniso: BoundTexture::constant([1.0, 1.0, 0.0, 1.0]),
-        };
+        let surface = SurfaceTextures::new(
+            BoundTexture::constant([0.5 + 0.5 * d.x, 0.5 + 0.5 * d.y, 0.0, 1.0]),
+            BoundTexture::constant([1.0, 1.0, 0.0, 1.0]),
+        );
         let mut scene = scene(vec![square(0)], vec![material(Vec3::ONE, 0.5, 0.5)]);
         scene.lights = vec![directional(vec3(-1.0, -1.0, -1.0), 1.0)];
         let environment = Environment::from_fn(16, |_| Vec3::ONE);

@@ -35,6 +35,8 @@ pub enum Slot {
     Anisotropy,
     /// `clearcoatNormalTexture` of `KHR_materials_clearcoat`.
     ClearcoatNormal,
+    /// `anisoTexture` of `KINRAN_materials_aniso`.
+    Aniso,
 }
 
 impl Slot {
@@ -48,6 +50,7 @@ impl Slot {
             Slot::Emissive => (&[], "emissiveTexture"),
             Slot::Anisotropy => (&["extensions", "KHR_materials_anisotropy"], "anisotropyTexture"),
             Slot::ClearcoatNormal => (&["extensions", "KHR_materials_clearcoat"], "clearcoatNormalTexture"),
+            Slot::Aniso => (&["extensions", "KINRAN_materials_aniso"], "anisoTexture"),
         }
     }
 }
@@ -317,6 +320,31 @@ impl Document {
         source: Option<usize>,
         alternatives: &[(TextureExtension, usize)],
     ) -> usize {
+        if source.is_none() {
+            alternatives.iter().for_each(|(extension, _)| self.use_extension(extension.name(), true));
+        }
+        self.push_texture(like, source, alternatives)
+    }
+
+    /// Adds a texture as [`Self::add_texture`] does that has no PNG or JPEG and that only a material's extension is going to
+    /// refer to, so that readers which do not know that one need not read it.
+    ///
+    /// # Panics
+    /// As [`Self::add_texture`].
+    pub fn add_optional_texture(
+        &mut self,
+        like: Option<usize>,
+        alternatives: &[(TextureExtension, usize)],
+    ) -> usize {
+        self.push_texture(like, None, alternatives)
+    }
+
+    fn push_texture(
+        &mut self,
+        like: Option<usize>,
+        source: Option<usize>,
+        alternatives: &[(TextureExtension, usize)],
+    ) -> usize {
         let images = array(&self.json, "images").len();
         assert!(source.is_some() || !alternatives.is_empty(), "a texture needs an image");
         assert!(
@@ -337,7 +365,7 @@ impl Document {
         let mut extensions = Object::new();
         for (extension, image) in alternatives {
             extensions.insert(extension.name().into(), json!({ "source": image }));
-            self.use_extension(extension.name(), source.is_none());
+            self.use_extension(extension.name(), false);
         }
         if !extensions.is_empty() {
             texture.insert("extensions".into(), extensions.into());

@@ -330,6 +330,13 @@ pub(crate) struct Anisotropy {
     pub(crate) anisotropy_texture: Option<TextureInfo>,
 }
 
+/// Units and ranges are in docs/schema/KINRAN_materials_aniso.schema.json.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub(crate) struct Aniso {
+    pub(crate) aniso_texture: TextureInfo,
+}
+
 /// Units and ranges are in docs/schema/KINRAN_materials_fuzz.schema.json.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]

@@ -20,7 +20,7 @@ use crate::{
 /// Extensions that may stand in `extensionsRequired`: those this module reads, and those that change how
 /// a surface looks but leave the rest of the document as it is; the latter are listed in
 /// [`Material::ignored_extensions`] or in [`Scene::warnings`].
-const ADMITTED_EXTENSIONS: [&str; 25] = [
+const ADMITTED_EXTENSIONS: [&str; 26] = [
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -41,6 +41,7 @@ const ADMITTED_EXTENSIONS: [&str; 25] = [
     "KHR_texture_basisu",
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
+    "KINRAN_materials_aniso",
     "KINRAN_materials_fuzz",
     "KINRAN_materials_skin",
     "KINRAN_mesh_curvature",
@@ -49,16 +50,17 @@ const ADMITTED_EXTENSIONS: [&str; 25] = [
 ];
 
 /// Material extensions that [`Material`] represents.
-const READ_MATERIAL_EXTENSIONS: [&str; 6] = [
+const READ_MATERIAL_EXTENSIONS: [&str; 7] = [
     "KHR_materials_anisotropy",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
     "KHR_materials_sheen",
+    "KINRAN_materials_aniso",
     "KINRAN_materials_fuzz",
     "KINRAN_materials_skin",
 ];
 
-/// Texture extensions whose image is taken when a texture has no core one.
+/// Texture extensions that name a KTX2 or DDS file.
 const TEXTURE_EXTENSIONS: [&str; 2] = ["KHR_texture_basisu", "MSFT_texture_dds"];
 
 /// Texels that all images of a scene may have together: four of 16384 by 16384, 4 GiB as RGBA8.
@@ -245,6 +247,12 @@ impl Loader<'_> {
             }),
             None => None,
         };
+        let aniso: Option<json::Aniso> =
+            self.extension(&material.extensions, "KINRAN_materials_aniso", &what)?;
+        let aniso = match aniso {
+            Some(aniso) => self.texture(&Some(aniso.aniso_texture), &format!("{what}: anisoTexture"))?,
+            None => None,
+        };
         let diffuse_transmission: Option<json::DiffuseTransmission> =
             self.extension(&material.extensions, "KHR_materials_diffuse_transmission", &what)?;
         let diffuse_transmission = match diffuse_transmission {
@@ -297,6 +305,7 @@ impl Loader<'_> {
             emissive_factor: self.finite(emissive.to_array(), &format!("{what}: emissiveFactor"))?.into(),
             emissive: self.texture(&material.emissive_texture, &format!("{what}: emissiveTexture"))?,
             anisotropy,
+            aniso,
             skin: self.skin(&material.extensions, &what)?,
             fuzz: self.fuzz(material, &what)?,
             diffuse_transmission,
@@ -475,13 +484,11 @@ impl Loader<'_> {
         let texture = (root.textures.get(info.index))
             .ok_or_else(|| self.error(format!("{what}: texture {} does not exist", info.index)))?;
 
-        let image = (texture.source).or_else(|| {
-            TEXTURE_EXTENSIONS
-                .iter()
-                .find_map(|name| texture.extensions.get(*name)?.get("source")?.as_u64())
-                .and_then(|source| usize::try_from(source).ok())
-        });
-        let Some(image) = image else {
+        let runtime = TEXTURE_EXTENSIONS
+            .iter()
+            .find_map(|name| texture.extensions.get(*name)?.get("source")?.as_u64())
+            .and_then(|source| usize::try_from(source).ok());
+        let Some(image) = texture.source.or(runtime) else {
             let names: Vec<&str> = texture.extensions.keys().map(String::as_str).collect();
             return Err(Error::unsupported(
                 self.name,
@@ -492,8 +499,12 @@ impl Loader<'_> {
                 ),
             ));
         };
-        let image = *(self.first_use.get(image))
-            .ok_or_else(|| self.error(format!("{what}: image {image} does not exist")))?;
+        let existing = |image: usize| {
+            let first = self.first_use.get(image).copied();
+            first.ok_or_else(|| self.error(format!("{what}: image {image} does not exist")))
+        };
+        let image = existing(image)?;
+        let runtime = runtime.map(existing).transpose()?;
 
         let (mut uv_set, mut transform) = (info.tex_coord, Mat3::IDENTITY);
         if let Some(extension) = &info.extensions.transform {
@@ -517,7 +528,7 @@ impl Loader<'_> {
                 [self.wrap(sampler.wrap_s, what)?, self.wrap(sampler.wrap_t, what)?]
             }
         };
-        Ok(Some(TextureRef { image, uv_set, transform, wrap }))
+        Ok(Some(TextureRef { image, runtime, uv_set, transform, wrap }))
     }
 
     fn wrap(&self, mode: u32, what: &str) -> Result<Wrap, Error> {
@@ -733,7 +744,8 @@ impl Loader<'_> {
 
         let material = &self.scene.materials[primitive.material];
         let uses: Vec<&TextureRef> = material.textures().collect();
-        let tangents_matter = material.normal.is_some() || material.anisotropy.is_some();
+        let tangents_matter =
+            material.normal.is_some() || material.anisotropy.is_some() || material.aniso.is_some();
         let tangent_set = uses.first().map_or(0, |texture| texture.uv_set);
         let missing: Vec<usize> = [0, 1]
             .into_iter()
@@ -1002,38 +1014,75 @@ impl Loader<'_> {
         Ok(())
     }
 
-    /// Decodes the images that materials use.
+    /// Decodes the images that materials use, and reads the runtime textures.
     fn images(&mut self, resolve: &Resolver<'_>) -> Result<(), Error> {
-        let mut used = vec![false; self.root.images.len()];
+        let count = self.root.images.len();
+        let (mut drawn, mut runtime) = (vec![false; count], vec![false; count]);
         for texture in self.scene.materials.iter().flat_map(Material::textures) {
-            used[texture.image] = true;
+            drawn[texture.image] = true;
+            if let Some(image) = texture.runtime {
+                runtime[image] = true;
+            }
         }
         let texels = AtomicU64::new(0);
-        let images: Result<Vec<_>, Error> = (used.into_par_iter().enumerate())
+        let images: Result<Vec<_>, Error> = (drawn.par_iter().enumerate())
             .map(
-                |(i, used)| {
+                |(i, &used)| {
                     if used { self.image(i, &texels, resolve).map(|i| Some(Arc::new(i))) } else { Ok(None) }
                 },
             )
             .collect();
         self.scene.images = images?;
+        let textures: Vec<_> = (runtime.into_par_iter().enumerate())
+            .map(|(i, used)| if used { self.runtime_texture(i, resolve).map(Some) } else { Ok(None) })
+            .collect();
+        for (texture, drawn) in textures.into_iter().zip(drawn) {
+            let texture = match texture {
+                Ok(texture) => texture.map(Arc::new),
+                // Without another image it is drawn itself, and an error was returned already.
+                Err(error) if !drawn => {
+                    self.warn(format!("{error}; the PNG or JPEG beside it is taken"));
+                    None
+                }
+                Err(error) => return Err(error),
+            };
+            self.scene.textures.push(texture);
+        }
         Ok(())
     }
 
-    fn image(&self, index: usize, texels: &AtomicU64, resolve: &Resolver<'_>) -> Result<Image, Error> {
+    fn runtime_texture(&self, index: usize, resolve: &Resolver<'_>) -> Result<Texture, Error> {
+        let mut fetched = Vec::new();
+        let (name, bytes) = self.image_bytes(index, &mut fetched, resolve)?;
+        let texture = kinran_image::decode_texture(&name, bytes)?;
+        texture.check()?;
+        Ok(texture)
+    }
+
+    /// What errors call an image, and its file's bytes, which `fetched` keeps where they are not in a buffer.
+    fn image_bytes<'a>(
+        &'a self,
+        index: usize,
+        fetched: &'a mut Vec<u8>,
+        resolve: &Resolver<'_>,
+    ) -> Result<(PathBuf, &'a [u8]), Error> {
         let what = format!("image {index}");
         let image = &self.root.images[index];
-        let fetched;
         let (name, bytes) = match (&image.uri, image.buffer_view) {
             (Some(uri), _) => {
-                fetched = fetch(self.name, &what, uri, resolve)?;
+                *fetched = fetch(self.name, &what, uri, resolve)?;
                 let name = if uri.starts_with("data:") { what } else { format!("{what} \"{uri}\"") };
                 (name, fetched.as_slice())
             }
             (None, Some(view)) => (what.clone(), self.accessors.view(view, &what)?),
             (None, None) => return Err(self.error(format!("{what} has neither uri nor bufferView"))),
         };
-        let name = PathBuf::from(format!("{}: {name}", self.name.display()));
+        Ok((PathBuf::from(format!("{}: {name}", self.name.display())), bytes))
+    }
+
+    fn image(&self, index: usize, texels: &AtomicU64, resolve: &Resolver<'_>) -> Result<Image, Error> {
+        let mut fetched = Vec::new();
+        let (name, bytes) = self.image_bytes(index, &mut fetched, resolve)?;
         let decoded = match bytes {
             [b'D', b'D', b'S', b' ', ..] | [0xab, b'K', b'T', b'X', ..] => {
                 level_zero(&kinran_image::decode_texture(&name, bytes)?)?

@@ -20,6 +20,8 @@ pub enum Wrap {
 pub struct TextureRef {
     /// Index into [`Scene::images`].
     pub image: usize,
+    /// Index into [`Scene::textures`], where the document has a KTX2 or DDS file beside or in place of the image.
+    pub runtime: Option<usize>,
     /// Which of a primitive's UV sets: 0 or 1.
     pub uv_set: usize,
     /// Maps the primitive's UV to the texture's (`KHR_texture_transform`; identity when absent).
@@ -162,6 +164,8 @@ pub struct Material {
     pub emissive: Option<TextureRef>,
     /// `KHR_materials_anisotropy`, when present.
     pub anisotropy: Option<Anisotropy>,
+    /// `KINRAN_materials_aniso`, when present: RGB hold an aniso texel, squared roughness in the frame of the normal map.
+    pub aniso: Option<TextureRef>,
     /// `KINRAN_materials_skin`, when present.
     pub skin: Option<Skin>,
     /// `KINRAN_materials_fuzz`, or `KHR_materials_sheen` as upright fibres.
@@ -176,6 +180,34 @@ pub struct Material {
     pub ignored_extensions: Vec<String>,
 }
 
+impl Default for Material {
+    /// A material of which a document says nothing.
+    fn default() -> Self {
+        Material {
+            name: String::new(),
+            base_color_factor: Vec4::ONE,
+            base_color: None,
+            metallic_factor: 1.0,
+            roughness_factor: 1.0,
+            metallic_roughness: None,
+            normal: None,
+            normal_scale: 1.0,
+            occlusion: None,
+            occlusion_strength: 1.0,
+            emissive_factor: Vec3::ZERO,
+            emissive: None,
+            anisotropy: None,
+            aniso: None,
+            skin: None,
+            fuzz: None,
+            diffuse_transmission: None,
+            alpha_mode: AlphaMode::Opaque,
+            double_sided: false,
+            ignored_extensions: Vec::new(),
+        }
+    }
+}
+
 impl Material {
     /// Every texture of the material; the normal map first, then the anisotropy map, for the first one
     /// tells which UV set generated tangents follow.
@@ -184,6 +216,7 @@ impl Material {
         [
             self.normal.as_ref(),
             self.anisotropy.as_ref().and_then(|anisotropy| anisotropy.texture.as_ref()),
+            self.aniso.as_ref(),
             self.base_color.as_ref(),
             self.metallic_roughness.as_ref(),
             self.occlusion.as_ref(),
@@ -281,6 +314,9 @@ pub struct Scene {
     /// Decoded images, in the document's order; `None` where no material uses the image, or where an
     /// earlier image has the same source and stands for it.
     pub images: Vec<Option<Arc<kinran_image::Image>>>,
+    /// KTX2 and DDS files with their mips, by the number of the document's image; `None` for other images, those that no
+    /// material uses, and those that could not be read but have a PNG or JPEG beside them.
+    pub textures: Vec<Option<Arc<kinran_image::Texture>>>,
     /// Lights.
     pub lights: Vec<Light>,
     /// Cameras.

@@ -221,6 +221,55 @@ fn engine_textures_stand_in_for_missing_images() {
     }
 }
 
+#[test]
+fn engine_textures_beside_images_are_read_too_or_their_loss_is_told() {
+    use kinran_image::{Format, Level, Texture, Transfer, encode_ktx2};
+    let level = Level { width: 4, height: 4, data: vec![0; 16] };
+    let texture = Texture {
+        format: Format::Bc7,
+        transfer: Transfer::Linear,
+        levels: vec![level],
+        metadata: Default::default(),
+    };
+    let good = encode_ktx2(&texture, None).unwrap();
+    let with = |file: &[u8]| {
+        let (mut json, mut bin) = everything();
+        bin.resize(bin.len().next_multiple_of(4), 0);
+        let view = json!({ "buffer": 0, "byteOffset": bin.len(), "byteLength": file.len() });
+        bin.extend(file);
+        json["buffers"][0]["byteLength"] = json!(bin.len());
+        let views = json["bufferViews"].as_array_mut().unwrap();
+        views.push(view);
+        let view = views.len() - 1;
+        let images = json["images"].as_array_mut().unwrap();
+        images.push(json!({ "bufferView": view }));
+        let image = images.len() - 1;
+        json["textures"][0]["extensions"] = json!({ "KHR_texture_basisu": { "source": image } });
+        (load(&glb(&json, &bin)).unwrap(), image)
+    };
+    let (scene, image) = with(&good);
+    assert_eq!(scene.textures[image].as_deref().map(|t| &t.levels), Some(&texture.levels));
+    let place = scene.materials.iter().flat_map(|m| m.textures()).find(|t| t.runtime == Some(image));
+    assert!(place.is_some_and(|t| t.image != image), "the PNG is still the image: {place:?}");
+
+    let (scene, image) = with(&good[..good.len() - 9]);
+    let told = scene.warnings.iter().any(|w| w.contains(&format!("image {image}")) && w.contains("PNG"));
+    assert!(scene.textures[image].is_none() && told, "{:?}", scene.warnings);
+}
+
+#[test]
+fn an_aniso_texture_is_read_where_its_extension_says() {
+    let (mut json, bin) = everything();
+    json["materials"][0]["extensions"]["KINRAN_materials_aniso"] =
+        json!({ "anisoTexture": { "index": 0, "texCoord": 1 } });
+    let scene = load(&glb(&json, &bin)).unwrap();
+    assert_eq!(scene.materials[0].aniso.as_ref().map(|t| t.uv_set), Some(1));
+    assert!(!scene.materials[0].ignored_extensions.iter().any(|e| e == "KINRAN_materials_aniso"));
+    json["materials"][0]["extensions"]["KINRAN_materials_aniso"] = json!({ "texture": { "index": 0 } });
+    let error = load(&glb(&json, &bin)).unwrap_err().to_string();
+    assert!(error.contains("KINRAN_materials_aniso") && error.contains("anisoTexture"), "{error}");
+}
+
 /// Each of these must be refused by one sentence that holds all the given words.
 #[test]
 fn hostile_documents_are_refused_by_name() {

@@ -14,6 +14,7 @@ mod error;
 pub mod fit;
 pub mod fuzz_sheet;
 pub mod inspect;
+pub mod model;
 mod outputs;
 pub mod picture;
 mod progress;

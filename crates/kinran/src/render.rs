@@ -7,17 +7,19 @@ use kinran_render::reference::{Film, RenderScene, TextureFiltering};
 use kinran_scene::Scene;
 use serde::Serialize;
 
+use crate::model::Model;
 use crate::skin::missing_curvature;
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::values::filter;
 use crate::view::{View, ViewArgs, file_name};
 use crate::{Console, Error, outputs};
 
-/// Renders a glTF file
+/// Renders a glTF file, or a folder of baked textures
 ///
-/// Every material with a normal or an anisotropy map is baked in memory first, with the filter that --filter
-/// names and the block compression that `kinran bake` uses, and drawn with the mips that result, as a GPU
-/// would sample them. The same input gives the same picture, bit by bit, on any number of threads.
+/// A model that `kinran bake` wrote, or any other with KTX2 or DDS files that hold mips, is drawn with these. Of others,
+/// every material with a normal or an anisotropy map is baked in memory first, with the filter that --filter names and the
+/// block compression that `kinran bake` uses, and drawn with the mips that result, as a GPU would sample them. The textures
+/// of a baked folder are laid on boards. The same input gives the same picture, bit by bit, on any number of threads.
 ///
 /// --backend gpu draws as a game does: deferred and forward, light from all around by spherical harmonics and
 /// a filtered probe, shadows of one directional light by a map.
@@ -28,9 +30,10 @@ use crate::{Console, Error, outputs};
   kinran render lamp.glb -o far.png --distance 8 --filter naive
   kinran render lamp.glb -o truth.png --filter none --spp 1024
   kinran render lamp.glb -o sun.png --env none --light 1,2,1 --background 0.2,0.3,0.5
+  kinran render baked/brocade/ -o brocade.png
   kinran render lamp.glb -o game.png --backend gpu")]
 pub struct Args {
-    /// The .glb or .gltf file
+    /// The .glb or .gltf file, or a folder that holds one, or the textures that `kinran bake` wrote
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
@@ -51,9 +54,10 @@ pub struct Args {
     pub spp: u32,
 
     /// Which mips are baked before rendering: ml, linear, param, lean or naive; none samples level 0
-    /// alone, uncompressed, which with many samples in a pixel is ground truth
-    #[arg(long, value_name = "NAME", default_value = "ml", value_parser = mips)]
-    pub filter: Mips,
+    /// alone, uncompressed, which with many samples in a pixel is ground truth; baked takes those of the model's own
+    /// KTX2 or DDS files. The default is baked where there are such files, else ml
+    #[arg(long, value_name = "NAME", value_parser = mips)]
+    pub filter: Option<Mips>,
 
     /// The most places along a slanted pixel's footprint at which a texture is read; 1 is trilinear
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=16))]
@@ -77,7 +81,10 @@ fn mips(text: &str) -> Result<Mips, String> {
     if text == "none" {
         return Ok(Mips::Level0);
     }
-    filter(text).map(Mips::Filtered).map_err(|e| format!("{e}, none"))
+    if text == "baked" {
+        return Ok(Mips::Baked);
+    }
+    filter(text).map(Mips::Filtered).map_err(|e| format!("{e}, none, baked"))
 }
 
 #[derive(Serialize)]
@@ -104,17 +111,30 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             "--backend gpu: this kinran was built without a GPU renderer; {fix}"
         )));
     }
-    let scene = Scene::load(&args.file)?;
-    let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
+    let Model { path, scene, only_baked } = Model::open(&args.file)?;
+    let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
+    let own = Mips::of(&scene);
+    let mips = args.filter.unwrap_or(own);
+    let refuse =
+        |reason: &str| Err(Error::Usage(format!("{}: --filter {}: {reason}", path.display(), mips.name())));
+    if only_baked && !matches!(mips, Mips::Baked | Mips::Level0) {
+        return refuse(
+            "a folder of baked textures has no maps to bake; leave --filter out, or name the model",
+        );
+    }
+    if mips == Mips::Baked && own != Mips::Baked {
+        return refuse("no material has its maps in KTX2 or DDS files; leave --filter out");
+    }
     let progress = console.progress();
-    let (surfaces, apart) = scene_surfaces(&scene, args.filter, &progress)?;
+    let drawn = if only_baked { Mips::Baked } else { mips };
+    let (surfaces, apart) = scene_surfaces(&scene, drawn, &progress)?;
     let warnings: Vec<String> =
         scene.warnings.iter().cloned().chain(apart).chain(missing_curvature(&scene)).collect();
     warnings.iter().for_each(|w| console.warn(w));
 
-    let filtering = match args.filter {
+    let filtering = match mips {
         Mips::Level0 => TextureFiltering::Level0,
-        Mips::Filtered(_) => TextureFiltering::Mips { max_anisotropy: args.max_anisotropy },
+        Mips::Filtered(_) | Mips::Baked => TextureFiltering::Mips { max_anisotropy: args.max_anisotropy },
     };
     let prepared = view.scene(&scene, surfaces)?;
     let film = match args.backend {
@@ -133,7 +153,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         width: film.width,
         height: film.height,
         samples_per_pixel: args.spp,
-        filter: args.filter.name(),
+        filter: mips.name(),
         triangles: triangles(&scene),
         warnings,
     };

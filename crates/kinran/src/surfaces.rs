@@ -9,7 +9,9 @@ use kinran_bake::aniso::{
 use kinran_bake::fuzz_fit::{Phase, fuzz_fit};
 use kinran_bake::{NoSurface, material_surface};
 use kinran_image::{Role, full_level_count, level_size};
-use kinran_render::reference::{BoundTexture, FuzzCoefficients, MipLevel, MipTexture, SurfaceTextures};
+use kinran_render::reference::{
+    AnisoEncoding, BoundTexture, FuzzCoefficients, MipLevel, MipTexture, SurfaceTextures,
+};
 use kinran_scene::{FuzzPhase, Material, Scene, TextureRef};
 
 use crate::{Error, Progress};
@@ -21,6 +23,9 @@ pub enum Mips {
     Filtered(Filter),
     /// Level 0 alone, in floats: ground truth.
     Level0,
+    /// The mip chains that came with the model in KTX2 or DDS files, as they are; materials without any as
+    /// [`Filter::Ml`] makes them.
+    Baked,
 }
 
 impl Mips {
@@ -29,7 +34,14 @@ impl Mips {
         match self {
             Mips::Filtered(filter) => filter.name(),
             Mips::Level0 => "truth",
+            Mips::Baked => "baked",
         }
+    }
+
+    /// What a model is drawn with unless someone asks for something else: its own mips if it has any.
+    pub fn of(scene: &Scene) -> Self {
+        let baked = (0..scene.materials.len()).any(|i| baked_surface(scene, i).is_ok_and(|s| s.is_some()));
+        if baked { Mips::Baked } else { Mips::Filtered(Filter::Ml) }
     }
 }
 
@@ -44,23 +56,63 @@ pub fn scene_surfaces(
     progress: &Progress,
 ) -> Result<(Vec<Option<SurfaceTextures>>, Vec<String>), Error> {
     let mut warnings = Vec::new();
-    let surfaces = (0..scene.materials.len()).map(|i| match material_surface(scene, i) {
-        Ok(surface) => {
-            let sheets = [Sheet::Normal, Sheet::Aniso];
-            let [normal, aniso] = textures(&surface.maps, sheets, mips, &scene.materials[i].name, progress)?;
-            Ok(Some(SurfaceTextures {
-                normal: BoundTexture::new(normal, &surface.place),
-                aniso: BoundTexture::new(aniso, &surface.place),
-            }))
-        }
-        Err(NoSurface::Plain) => Ok(None),
-        Err(NoSurface::Apart(reason)) => {
-            warnings.push(reason);
-            separate_surface(scene, &scene.materials[i], mips, progress).map(Some)
+    let surfaces = (0..scene.materials.len()).map(|i| {
+        let mips = match mips {
+            Mips::Baked => match baked_surface(scene, i)? {
+                Some(surface) => return Ok(Some(surface)),
+                None => Mips::Filtered(Filter::Ml),
+            },
+            mips => mips,
+        };
+        match material_surface(scene, i) {
+            Ok(surface) => {
+                let sheets = [Sheet::Normal, Sheet::Aniso];
+                let name = &scene.materials[i].name;
+                let [normal, aniso] = textures(&surface.maps, sheets, mips, name, progress)?;
+                let [normal, aniso] = [normal, aniso].map(|t| BoundTexture::new(t, &surface.place));
+                Ok(Some(SurfaceTextures::new(normal, aniso)))
+            }
+            Err(NoSurface::Plain) => Ok(None),
+            Err(NoSurface::Apart(reason)) => {
+                warnings.push(reason);
+                separate_surface(scene, &scene.materials[i], mips, progress).map(Some)
+            }
         }
     });
     let surfaces = surfaces.collect::<Result<_, Error>>()?;
     Ok((surfaces, warnings))
+}
+
+/// The surface that a material's own runtime textures hold; `None` where it has none of the maps that are filtered
+/// together, or one of them as an image only.
+fn baked_surface(scene: &Scene, material: usize) -> Result<Option<SurfaceTextures>, Error> {
+    let m = &scene.materials[material];
+    let runtime = |place: &TextureRef| place.runtime.and_then(|i| scene.textures.get(i)?.clone());
+    let bound = |place: &TextureRef| -> Result<Option<BoundTexture>, Error> {
+        let Some(texture) = runtime(place) else { return Ok(None) };
+        Ok(Some(BoundTexture::new(Arc::new(MipTexture::from_texture(&texture, place.wrap)?), place)))
+    };
+    // Where there is no map, it is flat, or round: a direction along the tangent, of no strength.
+    let or_constant = |place: Option<&TextureRef>, texel: [f32; 4]| match place {
+        Some(place) => bound(place),
+        None => Ok(Some(BoundTexture::constant(texel))),
+    };
+    let anisotropy = m.anisotropy.as_ref().filter(|a| a.strength > 0.0);
+    let anisotropy_place = anisotropy.and_then(|a| a.texture.as_ref());
+    if m.normal.is_none() && m.aniso.is_none() && anisotropy_place.is_none() || m.normal_scale != 1.0 {
+        return Ok(None);
+    }
+    let Some(normal) = or_constant(m.normal.as_ref(), [0.5, 0.5, 1.0, 1.0])? else { return Ok(None) };
+    if let Some(aniso) = m.aniso.as_ref().map(bound).transpose()?.flatten() {
+        return Ok(Some(SurfaceTextures::new(normal, aniso)));
+    }
+    let roughness_is_image = m.metallic_roughness.as_ref().is_some_and(|place| runtime(place).is_none());
+    let Some(aniso) = or_constant(anisotropy_place, [1.0, 0.5, 1.0, 1.0])? else { return Ok(None) };
+    let encoding = AnisoEncoding::Khr {
+        strength: anisotropy.map_or(0.0, |a| a.strength),
+        rotation: anisotropy.map_or(0.0, |a| a.rotation),
+    };
+    Ok((!roughness_is_image).then_some(SurfaceTextures { normal, aniso, encoding }))
 }
 
 /// The sheets of a surface as decoded mip chains.
@@ -73,6 +125,7 @@ fn textures<const N: usize>(
 ) -> Result<[Arc<MipTexture>; N], Error> {
     let size = maps.size();
     let Mips::Filtered(filter) = mips else {
+        // What is baked already never comes here.
         return Ok(sheets.map(|sheet| Arc::new(level_0(maps, sheet))));
     };
     let requests = sheets.map(|sheet| {
@@ -122,7 +175,7 @@ fn separate_surface(
     let anisotropy = m.anisotropy.as_ref().filter(|a| a.strength > 0.0);
     let anisotropy_place = anisotropy.and_then(|a| a.texture.as_ref());
     let roughness_place = m.metallic_roughness.as_ref();
-    let together = |a: &TextureRef| TextureRef { image: 0, ..a.clone() };
+    let together = |a: &TextureRef| TextureRef { image: 0, runtime: None, ..a.clone() };
     let roughness_place =
         roughness_place.filter(|r| anisotropy_place.is_none_or(|a| together(a) == together(r)));
 
@@ -150,15 +203,11 @@ fn separate_surface(
         scale: m.normal_scale,
         ..NormalMap::new(image, false)
     });
-    Ok(SurfaceTextures {
-        normal: bound(
-            Sheet::Normal,
-            m.normal.as_ref(),
-            normal,
-            RoughnessMaps::Isotropic(ScalarMap::constant(1.0)),
-        )?,
-        aniso: bound(Sheet::Aniso, anisotropy_place.or(roughness_place), NormalMap::flat(), roughness)?,
-    })
+    let smooth = RoughnessMaps::Isotropic(ScalarMap::constant(1.0));
+    Ok(SurfaceTextures::new(
+        bound(Sheet::Normal, m.normal.as_ref(), normal, smooth)?,
+        bound(Sheet::Aniso, anisotropy_place.or(roughness_place), NormalMap::flat(), roughness)?,
+    ))
 }
 
 /// Coefficients of a layer of fibres at `tilt` radians from the normal, for

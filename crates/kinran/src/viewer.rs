@@ -14,6 +14,7 @@ use eframe::egui;
 use kinran_render::realtime::{ShaderSource, wanted_features};
 use serde::Serialize;
 
+use crate::model::Place;
 use crate::values::size;
 use crate::view::ViewArgs;
 use crate::{Console, Error};
@@ -29,10 +30,10 @@ use parameters::Parameters;
 #[command(after_help = "Examples:
   kinran view lamp.glb
   kinran view lamp.glb --env studio.hdr --light 1,2,1
-  kinran view lamp.glb --parameters lamp.kinran.json
+  kinran view lamp.glb --parameters lamp.view.json
   kinran view lamp.glb --shaders my_shaders/     edit a shader there, and see it at once")]
 pub struct Args {
-    /// The .glb or .gltf file, or a folder that holds one, such as `kinran bake` writes; may also be dropped later
+    /// The .glb or .gltf file, or a folder that holds one, or the textures that `kinran bake` wrote; may also be dropped later
     #[arg(value_name = "FILE")]
     pub file: Option<PathBuf>,
 
@@ -66,7 +67,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if let Some(path) = &args.screenshot {
         crate::outputs::check_file(path, &["png"])?;
     }
-    let file = args.file.as_deref().map(loader::model_in).transpose()?;
+    // A name that is mistyped is told before a window opens.
+    args.file.as_deref().map(Place::of).transpose()?;
     let parameters = match &args.parameters {
         Some(path) => Parameters::load(path)?,
         None => Parameters::from_args(&args.view),
@@ -94,7 +96,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let outcome = Arc::new(Mutex::new(Outcome::default()));
     let inside = outcome.clone();
     let settings = app::Start {
-        file,
+        file: args.file.clone(),
         view: args.view.clone(),
         parameters,
         shaders: args.shaders.clone(),

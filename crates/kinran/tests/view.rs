@@ -229,7 +229,7 @@ fn a_person_can_drive_the_window() {
     let Some(display) = Display::start() else { return };
     let (folder, model) = square();
     let shaders = folder.path().join("shaders");
-    let parameters = folder.path().join("square.kinran.json");
+    let parameters = folder.path().join("square.view.json");
     let mut window = Window::open(&display, &[text(&model), "--shaders", text(&shaders)]);
     let at_rest = window.settle("the model", shows_a_model);
 
@@ -271,6 +271,66 @@ fn a_person_can_drive_the_window() {
         assert_ne!(turned["orbit"][what], before["orbit"][what], "{what} did not change");
     }
     assert_ne!(lit, at_rest, "the split line was not seen");
+
+    // Nearer, aside, and back to where it began.
+    let [x, y] = [middle - 100, 480].map(|x| x.to_string());
+    display.xdotool(&["mousemove", &x, &y, "sleep", "0.3", "click", "4", "sleep", "0.3"]);
+    let nearer = window.saved(&parameters);
+    let distance = |saved: &Value| saved["orbit"]["distance"].as_f64().unwrap();
+    assert!(
+        distance(&nearer) < distance(&turned),
+        "the wheel: {} to {}",
+        distance(&turned),
+        distance(&nearer)
+    );
+    display.drag("3", (middle - 100, 500), (middle - 60, 480));
+    let aside = window.saved(&parameters);
+    assert_ne!(aside["orbit"]["target"], nearer["orbit"]["target"], "the right button moved nothing");
+    display.keys(&["f", "c"]);
+    let framed = window.saved(&parameters);
+    assert_eq!(framed["orbit"], before["orbit"], "F did not frame the model");
+    display.keys(&["Escape"]);
+    window.settle("the model again", |screen| screen == at_rest);
+
+    // The picture without the controls.
+    let picture = folder.path().join("square.view.png");
+    display.keys(&["p"]);
+    window.wait("a saved picture", || picture.exists());
+    let image = read_image(&picture).unwrap();
+    let Pixels::U8(samples) = &image.pixels else { panic!("the saved picture has not 8 bits") };
+    let center = 3 * ((image.height / 2) * image.width + image.width / 2) as usize;
+    let (saved, seen) =
+        (&samples[center..center + 3], at_rest[HEIGHT / 2 * WIDTH + image.width as usize / 2]);
+    let apart = saved.iter().zip(seen).map(|(a, b)| a.abs_diff(b)).max();
+    assert!(apart <= Some(24), "the middle of the picture is {saved:?}, on the screen {seen:?}");
+    assert!(image.width as usize <= PANEL + 40, "the saved picture has the controls in it");
+
+    // A mistake in a shader is told, and the picture stays; what compiles is seen; Escape closes the message.
+    display.keys(&["Escape"]);
+    window.settle("no message", |screen| screen == at_rest);
+    let tonemap = shaders.join("tonemap.wgsl");
+    let right = std::fs::read_to_string(&tonemap).unwrap();
+    let end = "return vec4f(srgb_oetf(shown), 1.0);";
+    assert!(right.contains(end), "tonemap.wgsl ends otherwise now");
+    std::fs::write(&tonemap, right.replace(end, "return no_such_function(shown);")).unwrap();
+    let told = window.settle("the compiler's message", |screen| screen != at_rest);
+    assert_eq!(lower_picture(&told), lower_picture(&at_rest), "a mistake changed the picture");
+    std::fs::write(&tonemap, right.replace(end, "return vec4f(1.0 - srgb_oetf(shown), 1.0);")).unwrap();
+    let of = |screen: &[[u8; 3]]| u32::from(screen[HEIGHT / 2 * WIDTH + PANEL / 2][1]);
+    window.settle("the edit", |screen| of(screen).abs_diff(255 - of(&at_rest)) <= 2);
+    std::fs::write(&tonemap, &right).unwrap();
+    window.settle("the shaders as they were", |screen| screen == at_rest);
+
+    display.keys(&["ctrl+q"]);
+    let start = Instant::now();
+    let ended = loop {
+        if let Some(status) = window.process.try_wait().unwrap() {
+            break status;
+        }
+        assert!(start.elapsed() < PATIENCE, "Ctrl+Q does not close the window");
+        std::thread::sleep(Duration::from_millis(50));
+    };
+    assert!(ended.success(), "the window closed with {ended}");
 }
 
 #[test]

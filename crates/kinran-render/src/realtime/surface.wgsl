@@ -6,9 +6,11 @@ struct Material {
     emissive: vec4f,
     // x metallic, y roughness, z alpha cutoff, w transmissive.
     factors: vec4f,
-    // x 1: normals and roughness from the surface textures, y alpha mode: 0 opaque, 1 mask, 2 blend,
-    // z 1: double sided.
-    flags: vec4u,
+    // x 1: normals and roughness from the surface textures, 2: anisotropy and roughness as KHR_materials_anisotropy has
+    // them, y alpha mode: 0 opaque, 1 mask, 2 blend.
+    flags: vec2u,
+    // Strength and rotation of KHR_materials_anisotropy.
+    khr: vec2f,
     // x roughness, y anisotropy, z rotation, w normal scale: turned by hand, see Adjustment.
     adjustment: vec4f,
     // rgb colour of light that comes through diffusely, w its share.
@@ -92,10 +94,18 @@ fn surface_at(in: Varying, front: bool) -> Surface {
     let texel = textureSample(aniso_map, aniso_sampler, uv(in, 1u)).rgb;
 
     // Normal and roughness in the tangent frame of the mesh, which is not normalised: MikkTSpace.
-    let alpha = alpha_from_roughness(saturate(material.factors.y * metallic_roughness.g));
-    let mapped = material.flags.x == 1u;
+    let roughness = saturate(material.factors.y * metallic_roughness.g);
+    let alpha = alpha_from_roughness(roughness);
+    let mapped = material.flags.x > 0u;
     let n = select(vec3f(0.0, 0.0, 1.0), normal_from_xy(tilted.x, tilted.y), mapped);
-    let encoded = select(vec3f(alpha, 0.5, alpha), texel, mapped);
+    var encoded = select(vec3f(alpha, 0.5, alpha), texel, mapped);
+    if material.flags.x == 2u {
+        let alphas = alphas_from_khr_anisotropy(roughness, material.khr.x * texel.b);
+        let turn = vec2f(cos(material.khr.y), sin(material.khr.y));
+        let held = texel.rg * 2.0 - 1.0;
+        let direction = vec2f(turn.x * held.x - turn.y * held.y, turn.y * held.x + turn.x * held.y);
+        encoded = aniso_encode(aniso_from_alphas(alphas.x, alphas.y, axis_from_direction(direction, n)));
+    }
 
     // To world space. Back faces are the same relief seen from behind.
     let side = select(-1.0, 1.0, front);

@@ -11,8 +11,8 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
 
 use super::{Gpu, Layouts, fuzz, probe};
 use crate::reference::{
-    BoundTexture, FLAT, MipTexture, RenderMaterial, RenderScene, SkinCurvature, SkinTable, Surroundings,
-    TextureFiltering,
+    AnisoEncoding, BoundTexture, FLAT, MipTexture, RenderMaterial, RenderScene, SkinCurvature, SkinTable,
+    Surroundings, TextureFiltering,
 };
 
 /// Floats of a vertex: position, normal, tangent, both UV sets, colour, code of curvature.
@@ -334,7 +334,12 @@ fn material_floats(m: &RenderMaterial, adjustment: Adjustment, curvature_range: 
     floats.extend(m.emissive_factor.extend(m.occlusion_strength).to_array());
     let transmissive = f32::from(u8::from(m.transmissive));
     floats.extend([m.metallic_factor, m.roughness_factor, cutoff, transmissive]);
-    floats.extend([u32::from(m.surface.is_some()), mode, 0, 0].map(f32::from_bits));
+    let (surface, strength, rotation) = match m.surface.as_ref().map(|surface| surface.encoding) {
+        None => (0, 0.0, 0.0),
+        Some(AnisoEncoding::Texel) => (1, 0.0, 0.0),
+        Some(AnisoEncoding::Khr { strength, rotation }) => (2, strength, rotation),
+    };
+    floats.extend([f32::from_bits(surface), f32::from_bits(mode), strength, rotation]);
     let Adjustment { roughness, anisotropy, rotation, normal_scale } = adjustment;
     floats.extend([roughness, anisotropy, rotation, normal_scale]);
     let translucency = m.translucency.as_ref().map_or(Vec4::ZERO, |t| t.color_factor.extend(t.factor));

@@ -23,6 +23,8 @@ pub use camera::{CameraRay, PictureCamera, frame_box, look_at};
 pub use fuzz::{FUZZ_TILTS, FuzzCoefficients, RenderFuzz};
 pub use geometry::{FLAT, Geometry, MAX_TRIANGLES, SurfacePoint};
 pub use render::{Background, Film, Settings, TextureFiltering, render};
-pub use scene::{BoundTexture, RenderMaterial, RenderScene, SurfaceTextures, Surroundings, Translucency};
+pub use scene::{
+    AnisoEncoding, BoundTexture, RenderMaterial, RenderScene, SurfaceTextures, Surroundings, Translucency,
+};
 pub use skin::{RenderSkin, SkinCurvature, SkinTable, SkinTables};
 pub use texture::{MipLevel, MipTexture};

@@ -26,9 +26,31 @@ pub struct SurfaceTextures {
     /// R and G hold x and y of the tangent-space normal, mapped from [-1, 1] to [0, 1], +Y up, any normal
     /// scale applied. z is reconstructed after filtering, as shaders do with BC5.
     pub normal: BoundTexture,
-    /// RGB hold an aniso texel (see [`kinran_shading::aniso_encode`]): squared roughness in the frame
-    /// `M_n x, M_n y` of the normal in `normal`. It is filtered as it is encoded, then decoded.
+    /// What RGB hold is said by `encoding`. It is filtered as it is encoded, then decoded.
     pub aniso: BoundTexture,
+    /// How squared roughness is held.
+    pub encoding: AnisoEncoding,
+}
+
+impl SurfaceTextures {
+    /// Textures in Kinran's own form.
+    pub fn new(normal: BoundTexture, aniso: BoundTexture) -> Self {
+        SurfaceTextures { normal, aniso, encoding: AnisoEncoding::Texel }
+    }
+}
+
+/// How a texture holds anisotropic roughness.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AnisoEncoding {
+    /// An aniso texel (see [`kinran_shading::aniso_encode`]): squared roughness in the frame `M_n x, M_n y` of the normal.
+    Texel,
+    /// `KHR_materials_anisotropy`: RG a direction in the tangent plane, B a strength; roughness is the material's.
+    Khr {
+        /// 0 to 1, multiplied with B.
+        strength: f32,
+        /// Radians, added to the direction.
+        rotation: f32,
+    },
 }
 
 /// Light that a thin surface scatters to its other side; see [`kinran_scene::DiffuseTransmission`].
@@ -55,7 +77,8 @@ pub struct RenderMaterial {
     pub base_color: Option<BoundTexture>,
     /// Multiplied with B of `metallic_roughness`.
     pub metallic_factor: f32,
-    /// Perceptual roughness, multiplied with G of `metallic_roughness`. Unused where there is a `surface`.
+    /// Perceptual roughness, multiplied with G of `metallic_roughness`. Unused where there is a `surface` of
+    /// [`AnisoEncoding::Texel`].
     pub roughness_factor: f32,
     /// G perceptual roughness, B metallic.
     pub metallic_roughness: Option<BoundTexture>,
@@ -125,6 +148,7 @@ pub struct RenderScene {
 impl RenderScene {
     /// Prepares a scene. `surfaces` holds one entry for each of the scene's materials.
     ///
+    /// Colours and masks that have runtime textures are drawn with their mips, others with box-filtered ones.
     /// `KHR_materials_transmission`, which [`Material`] does not represent, makes a material
     /// [`transmissive`](RenderMaterial::transmissive).
     ///
@@ -198,12 +222,18 @@ struct TextureLoader<'a> {
 
 impl TextureLoader<'_> {
     fn texture(&mut self, place: &TextureRef, transfer: Transfer) -> Result<BoundTexture, Error> {
-        let key = (place.image, transfer, place.wrap);
+        let key = (place.runtime.unwrap_or(place.image), transfer, place.wrap);
         if !self.loaded.contains_key(&key) {
             let image = self.scene.images.get(place.image).and_then(Option::as_ref).ok_or_else(|| {
                 Error::Scene(format!("image {} is used by a material but was not loaded", place.image))
             })?;
-            self.loaded.insert(key, Arc::new(MipTexture::from_image(image, transfer, place.wrap)));
+            let runtime = place.runtime.and_then(|i| self.scene.textures.get(i)?.as_ref());
+            let texture = match runtime {
+                Some(texture) => MipTexture::from_texture(texture, place.wrap)
+                    .map_err(|e| Error::Scene(format!("the texture of image {}: {e}", place.image)))?,
+                None => MipTexture::from_image(image, transfer, place.wrap),
+            };
+            self.loaded.insert(key, Arc::new(texture));
         }
         Ok(BoundTexture::new(self.loaded[&key].clone(), place))
     }

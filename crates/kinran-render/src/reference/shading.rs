@@ -10,14 +10,15 @@ use super::{
     fuzz::FuzzAt,
     geometry::SurfacePoint,
     render::TextureFiltering,
-    scene::{BoundTexture, RenderMaterial},
+    scene::{AnisoEncoding, BoundTexture, RenderMaterial},
     skin::SkinPoint,
 };
-use glam::{Mat3, Vec3, Vec4, Vec4Swizzles};
+use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, Vec4, Vec4Swizzles};
 use kinran_scene::AlphaMode;
 use kinran_shading::{
-    alpha_from_roughness, aniso_decode, ggx_aniso_d, ggx_d, m_n, multiscatter_compensation, normal_from_xy,
-    schlick_f, smith_aniso_v, smith_v,
+    alpha_from_roughness, alphas_from_khr_anisotropy, aniso_decode, aniso_encode, aniso_from_alphas,
+    axis_from_direction, ggx_aniso_d, ggx_d, m_n, multiscatter_compensation, normal_from_xy, schlick_f,
+    smith_aniso_v, smith_v,
 };
 use std::f32::consts::FRAC_1_PI;
 
@@ -103,6 +104,16 @@ pub(crate) fn shadow_transmittance(
     Vec3::splat(1.0 - opacity) + opacity * through
 }
 
+impl AnisoEncoding {
+    /// The aniso texel of what a texture holds, where the surface has a roughness and a normal.
+    pub(crate) fn texel(self, held: Vec3, roughness: f32, n: Vec3) -> Vec3 {
+        let AnisoEncoding::Khr { strength, rotation } = self else { return held };
+        let (alpha_t, alpha_b) = alphas_from_khr_anisotropy(roughness, strength * held.z);
+        let direction = Vec2::from_angle(rotation).rotate(held.xy() * 2.0 - 1.0);
+        aniso_encode(aniso_from_alphas(alpha_t, alpha_b, axis_from_direction(direction, n)))
+    }
+}
+
 impl Shading {
     /// Evaluates `material` at `point`, seen along `view`, the unit direction towards the viewer.
     ///
@@ -121,13 +132,15 @@ impl Shading {
         let metallic = (material.metallic_factor * metallic_roughness.z).clamp(0.0, 1.0);
 
         // Normal and roughness, in the tangent frame of the mesh.
+        let roughness = (material.roughness_factor * metallic_roughness.y).clamp(0.0, 1.0);
         let (n, texel) = match &material.surface {
             Some(surface) => {
                 let xy = sample_bound(&surface.normal, point, filtering).xy() * 2.0 - 1.0;
-                (normal_from_xy(xy.x, xy.y), sample_bound(&surface.aniso, point, filtering).xyz())
+                let n = normal_from_xy(xy.x, xy.y);
+                let texel = sample_bound(&surface.aniso, point, filtering).xyz();
+                (n, surface.encoding.texel(texel, roughness, n))
             }
             None => {
-                let roughness = (material.roughness_factor * metallic_roughness.y).clamp(0.0, 1.0);
                 let alpha = alpha_from_roughness(roughness);
                 (Vec3::Z, Vec3::new(alpha, 0.5, alpha))
             }

@@ -1,7 +1,7 @@
 //! Small scenes for tests and benches.
 
 use glam::{Affine3A, Vec2, Vec3, vec2, vec3, vec4};
-use kinran_scene::{AlphaMode, Instance, Light, LightKind, Material, Primitive, Scene, Source};
+use kinran_scene::{Instance, Light, LightKind, Material, Primitive, Scene, Source};
 
 /// A square of side 2 in the xy plane, facing +z, u to the right and v down.
 pub(crate) fn square(material: usize) -> Primitive {
@@ -52,23 +52,9 @@ pub(crate) fn material(base_color: Vec3, metallic: f32, roughness: f32) -> Mater
     Material {
         name: "test".into(),
         base_color_factor: base_color.extend(1.0),
-        base_color: None,
         metallic_factor: metallic,
         roughness_factor: roughness,
-        metallic_roughness: None,
-        normal: None,
-        normal_scale: 1.0,
-        occlusion: None,
-        occlusion_strength: 1.0,
-        emissive_factor: Vec3::ZERO,
-        emissive: None,
-        anisotropy: None,
-        skin: None,
-        fuzz: None,
-        diffuse_transmission: None,
-        alpha_mode: AlphaMode::Opaque,
-        double_sided: false,
-        ignored_extensions: Vec::new(),
+        ..Material::default()
     }
 }
 

@@ -264,7 +264,9 @@ impl SurfaceBaker<'_> {
             report.outputs.extend(self.place(planned, texture, image, materials, &surface.place)?);
         }
         if let Some(aniso) = aniso {
-            report.outputs.extend(write_texture(args, &format!("{}_aniso", self.name), "aniso", aniso)?);
+            let outputs = write_texture(args, &format!("{}_aniso", self.name), "aniso", aniso)?;
+            self.place_aniso(&outputs, materials);
+            report.outputs.extend(outputs);
         }
         Ok(report)
     }
@@ -310,6 +312,25 @@ impl SurfaceBaker<'_> {
         Ok(outputs)
     }
 
+    /// Refers to an aniso texture, which lies as the normal map does, or as the anisotropy map where there is none.
+    fn place_aniso(&mut self, outputs: &[Output], materials: &[usize]) {
+        let alternatives = alternatives(self.document, outputs);
+        let slots = [Slot::Normal, Slot::Anisotropy];
+        let like = slots.iter().find_map(|&slot| self.document.texture(materials[0], slot));
+        let new = self.document.add_optional_texture(like, &alternatives);
+        for &material in materials {
+            self.document.set_texture(material, Slot::Aniso, new);
+            let material = self.document.material_mut(material);
+            let info = like_surface(material);
+            let texture = material.get_mut("extensions").and_then(|e| e.get_mut("KINRAN_materials_aniso"));
+            if let Some(texture) =
+                texture.and_then(|e| e.get_mut("anisoTexture")).and_then(Value::as_object_mut)
+            {
+                texture.extend(info);
+            }
+        }
+    }
+
     fn inputs(&self, material: usize) -> Result<Vec<Input>, Error> {
         let m = &self.scene.materials[material];
         let anisotropy = m.anisotropy.as_ref().and_then(|a| a.texture.as_ref());
@@ -345,17 +366,20 @@ fn alternatives(document: &mut Document, outputs: &[Output]) -> Vec<(TextureExte
         .collect()
 }
 
+/// Where a material's normal map lies on the mesh, or its anisotropy map where there is none.
+fn like_surface(material: &kinran_scene::Object) -> kinran_scene::Object {
+    let anisotropy = (material.get("extensions"))
+        .and_then(|e| e.get("KHR_materials_anisotropy")?.get("anisotropyTexture"));
+    let texture = material.get("normalTexture").or(anisotropy).and_then(Value::as_object);
+    let mut like = texture.cloned().unwrap_or_default();
+    like.retain(|key, _| key == "texCoord" || key == "extensions");
+    like
+}
+
 /// Sets the factors that are in the texture now to one, and lays a texture that is new on the mesh as `place`
 /// says.
 fn reset_factors(material: &mut kinran_scene::Object, slot: Slot, place: Option<&TextureRef>) {
-    let object = |value: Option<&mut Value>| -> Option<kinran_scene::Object> { value?.as_object().cloned() };
-    // A new texture lies as the normal map does, or as the anisotropy map where there is none.
-    let anisotropy_texture = material
-        .get_mut("extensions")
-        .and_then(|e| e.get_mut("KHR_materials_anisotropy")?.get_mut("anisotropyTexture"));
-    let anisotropy_texture = object(anisotropy_texture);
-    let mut like = object(material.get_mut("normalTexture")).or(anisotropy_texture).unwrap_or_default();
-    like.retain(|key, _| key == "texCoord" || key == "extensions");
+    let like = like_surface(material);
     let lay = |texture: Option<&mut Value>| {
         if let (Some(texture), Some(_)) = (texture.and_then(Value::as_object_mut), place) {
             texture.extend(like.clone());

@@ -110,13 +110,17 @@ pub(super) fn inspect(path: &Path, console: &Console) -> Result<(), Error> {
 
 fn maps(scene: &Scene, m: &Material) -> Vec<MapReport> {
     let anisotropy = m.anisotropy.as_ref().and_then(|a| a.texture.as_ref());
-    let slots: [(&str, Option<&TextureRef>); 6] = [
+    let diffuse_transmission = m.diffuse_transmission.as_ref();
+    let slots: [(&str, Option<&TextureRef>); 9] = [
         ("baseColor", m.base_color.as_ref()),
         ("metallicRoughness", m.metallic_roughness.as_ref()),
         ("normal", m.normal.as_ref()),
         ("anisotropy", anisotropy),
+        ("aniso", m.aniso.as_ref()),
         ("occlusion", m.occlusion.as_ref()),
         ("emissive", m.emissive.as_ref()),
+        ("diffuseTransmission", diffuse_transmission.and_then(|d| d.texture.as_ref())),
+        ("diffuseTransmissionColor", diffuse_transmission.and_then(|d| d.color.as_ref())),
     ];
     let report = |(slot, place): (&'static str, Option<&TextureRef>)| {
         let place = place?;

@@ -197,6 +197,8 @@ impl App {
             self.parameters.materials.clone_from(&authored);
             self.parameters.orbit = None;
             self.parameters.intensities.clear();
+            let own = METHODS.iter().position(|(_, mips)| *mips == opened.mips);
+            self.parameters.methods[0] = own.unwrap_or_default();
         }
         if self.parameters.intensities.len() != opened.view.lights.len() {
             self.parameters.intensities = opened.view.lights.iter().map(|l| l.color.max_element()).collect();
@@ -451,10 +453,10 @@ impl App {
             Path::new(name).with_extension(extension)
         };
         let saved = if wishes.save_picture {
-            let path = beside("kinran.png");
+            let path = beside("view.png");
             Some((self.save_picture(&path), path))
         } else if wishes.save_parameters {
-            let path = beside("kinran.json");
+            let path = beside("view.json");
             Some((self.parameters.save(&path), path))
         } else {
             None
@@ -475,10 +477,7 @@ impl App {
             self.grant(Wishes { light: true, ..Wishes::default() });
             return;
         }
-        match loader::model_in(path) {
-            Ok(file) => self.loader.ask(Job::Open(file, args_with_light(&self.args, &self.parameters))),
-            Err(error) => self.message = error.to_string(),
-        }
+        self.loader.ask(Job::Open(path.into(), args_with_light(&self.args, &self.parameters)));
     }
 
     /// The picture without the controls, both sides of the line.

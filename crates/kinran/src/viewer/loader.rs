@@ -14,6 +14,7 @@ use kinran_render::realtime::{GpuLight, GpuScene, Realtime, ShaderSource};
 use kinran_render::reference::{RenderScene, SurfaceTextures, Surroundings, TextureFiltering};
 use kinran_scene::Scene;
 
+use crate::model::Model;
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::view::{EnvironmentChoice, View, ViewArgs, environment};
 use crate::{Error, Progress};
@@ -50,6 +51,8 @@ pub(super) enum Event {
 /// A model that was just read.
 pub(super) struct Opened {
     pub(super) name: String,
+    /// What it is drawn with at first.
+    pub(super) mips: Mips,
     pub(super) view: View,
     pub(super) material_names: Vec<String>,
     pub(super) scene: RenderScene,
@@ -124,6 +127,7 @@ impl Loader {
             common: common.clone(),
             bakes,
             model: None,
+            only_baked: false,
             surfaces: HashMap::new(),
             light: None,
         };
@@ -187,6 +191,8 @@ struct Work {
     common: Arc<Common>,
     bakes: Sender<Bake>,
     model: Option<(Arc<Scene>, RenderScene)>,
+    /// Whether the model is textures alone, so that every method shows the same mips.
+    only_baked: bool,
     /// Textures of the model that were baked.
     surfaces: HashMap<Mips, Surfaces>,
     /// The model's light on the device.
@@ -205,12 +211,13 @@ impl Work {
     fn run(&mut self, job: Job) -> Result<Vec<Event>, Error> {
         match job {
             Job::Open(path, args) => {
-                let scene = Scene::load(&path)?;
+                let Model { path, scene, only_baked } = Model::open(&path)?;
                 let view = View::new(&scene, &path.to_string_lossy(), &args)?;
                 let plain = vec![None; scene.materials.len()];
                 let prepared = view.scene(&scene, plain)?;
                 let opened = Opened {
                     name: path.to_string_lossy().into_owned(),
+                    mips: Mips::of(&scene),
                     view,
                     material_names: scene.materials.iter().map(|m| m.name.clone()).collect(),
                     scene: prepared.clone(),
@@ -218,6 +225,7 @@ impl Work {
                     at: Instant::now(),
                 };
                 self.model = Some((Arc::new(scene), prepared));
+                self.only_baked = only_baked;
                 self.common.model.fetch_add(1, Relaxed);
                 self.surfaces.clear();
                 self.light = None;
@@ -228,9 +236,11 @@ impl Work {
                 if self.surfaces.contains_key(&mips) {
                     return self.bring(mips);
                 }
-                if mips == Mips::Level0 {
+                let baked = mips == Mips::Baked && Mips::of(scene) == Mips::Baked;
+                if mips == Mips::Level0 || baked || self.only_baked {
                     // There is nothing to filter, so this is soon done.
-                    let (surfaces, _) = scene_surfaces(scene, mips, &Progress::new(false))?;
+                    let drawn = if self.only_baked { Mips::Baked } else { mips };
+                    let (surfaces, _) = scene_surfaces(scene, drawn, &Progress::new(false))?;
                     self.surfaces.insert(mips, surfaces);
                     return self.bring(mips);
                 }
@@ -265,7 +275,7 @@ impl Work {
         }
         let filtering = match mips {
             Mips::Level0 => TextureFiltering::Level0,
-            Mips::Filtered(_) => TextureFiltering::Mips { max_anisotropy: 16 },
+            Mips::Filtered(_) | Mips::Baked => TextureFiltering::Mips { max_anisotropy: 16 },
         };
         let renderer = self.renderer.read().map_err(|e| Error::Internal(e.to_string()))?;
         if self.common.closing.load(Relaxed) {
@@ -273,37 +283,6 @@ impl Work {
         }
         let light = self.light.get_or_insert_with(|| renderer.light_of(&with_mips));
         Ok(vec![Event::Baked(mips, Box::new(renderer.load(&with_mips, light, filtering)))])
-    }
-}
-
-/// The model that a path names: a file itself, or the only glTF file in a folder.
-///
-/// # Errors
-/// [`Error::Usage`] for a path that does not exist and a folder with none or several.
-pub(super) fn model_in(path: &Path) -> Result<PathBuf, Error> {
-    let complain = |e: &dyn std::fmt::Display| Error::Usage(format!("{}: {e}", path.display()));
-    if !path.exists() {
-        return Err(complain(&"there is no such file or folder"));
-    }
-    if !path.is_dir() {
-        return Ok(path.into());
-    }
-    let mut models = Vec::new();
-    for entry in std::fs::read_dir(path).map_err(|e| complain(&e))? {
-        let file = entry.map_err(|e| complain(&e))?.path();
-        if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb") || e.eq_ignore_ascii_case("gltf")) {
-            models.push(file);
-        }
-    }
-    models.sort();
-    match models.as_slice() {
-        [] => Err(complain(&"no .glb or .gltf file in this folder; name one")),
-        [model] => Ok(model.clone()),
-        [first, ..] => Err(complain(&format!(
-            "{} models in this folder; name one, such as {}",
-            models.len(),
-            first.display()
-        ))),
     }
 }
 
@@ -330,18 +309,6 @@ pub(super) fn middle(scene: &RenderScene) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_folder_is_a_model_only_when_it_holds_one() {
-        let folder = tempfile::tempdir().unwrap();
-        assert!(model_in(folder.path()).unwrap_err().to_string().contains("no .glb"));
-        std::fs::write(folder.path().join("a.glb"), "").unwrap();
-        std::fs::write(folder.path().join("a.png"), "").unwrap();
-        assert_eq!(model_in(folder.path()).unwrap(), folder.path().join("a.glb"));
-        std::fs::write(folder.path().join("b.gltf"), "").unwrap();
-        assert!(model_in(folder.path()).unwrap_err().to_string().contains("2 models"));
-        assert!(model_in(&folder.path().join("c")).unwrap_err().to_string().contains("no such"));
-    }
 
     #[test]
     fn filling_a_folder_keeps_what_was_edited() {

@@ -39,12 +39,13 @@ pub(super) const CURVATURES: [(&str, SkinCurvature); 4] = [
 ];
 
 /// Names and meanings of the ways to filter.
-pub(super) const METHODS: [(&str, Mips); 5] = [
+pub(super) const METHODS: [(&str, Mips); 6] = [
     ("ml", Mips::Filtered(Filter::Ml)),
     ("linear", Mips::Filtered(Filter::Linear)),
     ("lean", Mips::Filtered(Filter::Lean)),
     ("naive", Mips::Filtered(Filter::Naive)),
     ("ground truth", Mips::Level0),
+    ("as baked", Mips::Baked),
 ];
 
 /// A material as the sliders have it; factors multiply its textures.
@@ -283,7 +284,7 @@ impl Parameters {
         let text = std::fs::read_to_string(path).map_err(|e| complain(&e))?;
         let parameters: Self = serde_json::from_str(&text).map_err(|e| complain(&e))?;
         let checks = [
-            ("methods", parameters.methods.iter().all(|&m| m < METHODS.len()), "two numbers from 0 to 4"),
+            ("methods", parameters.methods.iter().all(|&m| m < METHODS.len()), "two numbers from 0 to 5"),
             ("channel", parameters.channel < CHANNELS.len(), "a number from 0 to 6"),
             ("split_at", (0.0..=1.0).contains(&parameters.split_at), "a number from 0 to 1"),
             ("tonemap", ["aces", "agx", "none"].contains(&parameters.tonemap.as_str()), "aces, agx or none"),

@@ -1,8 +1,9 @@
 //! `kinran render` and `kinran compare` on a small model.
 
-use crate::common::{files, kinran, kinran_json, square, text};
-use kinran_image::{Image, Pixels, read_image};
+use crate::common::{bumps, files, kinran, kinran_json, refused, square, text};
+use kinran_image::{Channels, Image, Pixels, encode_png, read_image};
 use kinran_render::metrics::{flip, rmse_srgb8};
+use std::path::Path;
 
 fn pixels(image: &Image) -> Vec<[u8; 3]> {
     let Pixels::U8(samples) = &image.pixels else { panic!("no 8-bit picture") };
@@ -205,4 +206,59 @@ fn from_afar_naive_mips_are_farther_from_the_truth_than_fitted_ones() {
     ]);
     let error = |i: usize| report["methods"][i]["distances"][0]["rmse"].as_f64().unwrap();
     assert!(error(0) < 0.5 * error(1), "ml is off by {}, naive by {}", error(0), error(1));
+}
+
+/// A picture of a model or a folder from far away, where mips matter.
+fn far(model: &Path, flags: &[&str], out: &Path) -> Vec<[u8; 3]> {
+    let args = ["render", text(model), "-o", text(out), "--size", "64x64", "--spp", "64", "--distance", "3"];
+    let said = kinran(&[&args[..], &["--max-anisotropy", "1"], flags].concat());
+    assert_eq!(said.code, Some(0), "{}: {}", model.display(), said.err);
+    pixels(&read_image(out).unwrap())
+}
+
+#[test]
+fn a_baked_model_is_drawn_with_its_own_levels() {
+    let (folder, model) = square();
+    let out = folder.path().join("out.png");
+    for form in ["khr", "both"] {
+        let baked = |filter: &str| {
+            let name = folder.path().join(format!("{form} {filter}"));
+            let args = ["bake", text(&model), "-o", text(&name), "--filter", filter, "--form", form];
+            assert_eq!(kinran(&args).code, Some(0));
+            name
+        };
+        let (linear, naive) = (baked("linear"), baked("naive"));
+        let own = far(&linear, &[], &out);
+        // Eight bits of roughness instead of squared roughness, and other blocks.
+        let again = rmse_srgb8(&own, &far(&model, &["--filter", "linear"], &out)).unwrap();
+        let other = rmse_srgb8(&own, &far(&naive, &[], &out)).unwrap();
+        let rebaked = far(&linear, &["--filter", "naive"], &out);
+        let by_hand = rmse_srgb8(&rebaked, &far(&model, &["--filter", "naive"], &out)).unwrap();
+        assert!(again < 0.01, "form {form}: RMSE {again} beside the same filter in memory");
+        assert!(
+            other > 3.0 * again,
+            "form {form}: RMSE {other} beside naive levels, {again} beside the same"
+        );
+        assert!(by_hand < 1e-6, "form {form}: --filter bakes the authored maps again: {by_hand}");
+    }
+    refused(&["render", text(&model), "-o", text(&out), "--filter", "baked"], &["--filter baked", "leave"]);
+}
+
+#[test]
+fn a_folder_of_baked_textures_is_laid_on_a_board() {
+    let folder = tempfile::tempdir().unwrap();
+    let (maps, baked) = (folder.path().join("maps"), folder.path().join("baked"));
+    std::fs::create_dir(&maps).unwrap();
+    std::fs::write(maps.join("tin_normal.png"), encode_png(&bumps()).unwrap()).unwrap();
+    let red = Image::new(1, 1, Channels::Rgb, Pixels::U8(vec![200, 10, 10])).unwrap();
+    std::fs::write(maps.join("tin_baseColor.png"), encode_png(&red).unwrap()).unwrap();
+    assert_eq!(kinran(&["bake", text(&maps), "-o", text(&baked), "--roughness", "0.6"]).code, Some(0));
+    let out = folder.path().join("out.png");
+    let middle = far(&baked, &["--from", "0,0,1"], &out)[32 * 64 + 32];
+    assert!(middle[0] > 80 && middle[0] > 2 * middle[1], "a red board, got {middle:?}");
+
+    refused(&["render", text(&baked), "-o", text(&out), "--filter", "ml"], &["no maps to bake"]);
+    std::fs::remove_file(baked.join("tin_normal.ktx2")).unwrap();
+    refused(&["render", text(&baked), "-o", text(&out)], &["tin_normal.ktx2"]);
+    refused(&["render", text(&maps), "-o", text(&out)], &["no .glb", "bake one"]);
 }

@@ -1,0 +1,224 @@
+//! What a path shows: a glTF file, a folder that holds one, or a folder of baked textures.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
+use kinran_image::{Channels, Image, Pixels, read_texture};
+use kinran_scene::{Anisotropy, Instance, Material, Primitive, Scene, Source, TextureRef, Wrap};
+use serde::Deserialize;
+
+use crate::Error;
+
+/// A model and where it comes from.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// The glTF file, or the folder of textures.
+    pub path: PathBuf,
+    /// What it shows.
+    pub scene: Scene,
+    /// There are no maps to bake again: the textures are all there is.
+    pub only_baked: bool,
+}
+
+/// The sidecar of a bake, as far as it says which file is what.
+#[derive(Deserialize)]
+struct Sidecar {
+    surfaces: Vec<Surface>,
+}
+
+#[derive(Deserialize)]
+struct Surface {
+    name: String,
+    outputs: Vec<Output>,
+}
+
+#[derive(Deserialize)]
+struct Output {
+    file: String,
+    map: String,
+}
+
+/// Metres along a board's side, and between two of them; chosen by eye.
+const BOARD: f32 = 1.0;
+const GAP: f32 = 0.1;
+
+/// Where a model lies.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A glTF file.
+    File(PathBuf),
+    /// A folder of textures, and their sidecars.
+    Textures(PathBuf, Vec<PathBuf>),
+}
+
+impl Place {
+    /// The glTF file `path`, the only one in the folder `path`, or the textures that `kinran bake` wrote there. Nothing is
+    /// read yet.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a path that does not exist and a folder with nothing to show, or with several models.
+    pub fn of(path: &Path) -> Result<Self, Error> {
+        let complain = |e: &dyn std::fmt::Display| Error::Usage(format!("{}: {e}", path.display()));
+        if !path.exists() {
+            return Err(complain(&"there is no such file or folder"));
+        }
+        if !path.is_dir() {
+            return Ok(Place::File(path.into()));
+        }
+        let mut files = Vec::new();
+        for entry in std::fs::read_dir(path).map_err(|e| complain(&e))? {
+            files.push(entry.map_err(|e| complain(&e))?.path());
+        }
+        files.sort();
+        let ending = |endings: &[&str]| -> Vec<PathBuf> {
+            let ends = |file: &Path| {
+                let name = file.to_string_lossy().to_ascii_lowercase();
+                endings.iter().any(|ending| name.ends_with(ending))
+            };
+            files.iter().filter(|file| ends(file)).cloned().collect()
+        };
+        let sidecars = ending(&[".kinran.json"]);
+        match ending(&[".glb", ".gltf"]).as_slice() {
+            [model] => Ok(Place::File(model.clone())),
+            [] if sidecars.is_empty() => Err(complain(
+                &"no .glb or .gltf file in this folder, and no textures that `kinran bake` wrote with their .kinran.json; name a model, or bake one",
+            )),
+            [] => Ok(Place::Textures(path.into(), sidecars)),
+            models @ [first, ..] => Err(complain(&format!(
+                "{} models in this folder; name one, such as {}",
+                models.len(),
+                first.display()
+            ))),
+        }
+    }
+}
+
+impl Model {
+    /// Reads what lies at `path`, see [`Place::of`]; textures alone are laid on boards a metre wide, one for each material.
+    ///
+    /// # Errors
+    /// Those of [`Place::of`] and of the files.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        match Place::of(path)? {
+            Place::File(path) => {
+                let scene = Scene::load(&path)?;
+                Ok(Model { path, scene, only_baked: false })
+            }
+            Place::Textures(path, sidecars) => {
+                let scene = boards(&path, &sidecars)?;
+                Ok(Model { path, scene, only_baked: true })
+            }
+        }
+    }
+}
+
+/// A board for each material of the sidecars, side by side along x, facing +z.
+fn boards(folder: &Path, sidecars: &[PathBuf]) -> Result<Scene, Error> {
+    let mut scene = Scene::default();
+    for sidecar in sidecars {
+        let text = std::fs::read_to_string(sidecar)
+            .map_err(|e| Error::Usage(format!("{}: {e}", sidecar.display())))?;
+        let read: Sidecar = serde_json::from_str(&text).map_err(|e| {
+            Error::Usage(format!("{}: not what `kinran bake` writes: {e}; bake again", sidecar.display()))
+        })?;
+        for surface in read.surfaces {
+            let material = material(folder, surface, &mut scene)?;
+            scene.materials.push(material);
+        }
+    }
+    let count = scene.materials.len();
+    for i in 0..count {
+        scene.primitives.push(board(i));
+        let x = (i as f32 - 0.5 * (count - 1) as f32) * (BOARD + GAP);
+        let transform = Affine3A::from_translation(Vec3::new(x, 0.0, 0.0));
+        scene.instances.push(Instance { primitive: i, transform });
+    }
+    Ok(scene)
+}
+
+/// A surface's textures as a material.
+fn material(folder: &Path, surface: Surface, scene: &mut Scene) -> Result<Material, Error> {
+    let mut material = Material {
+        name: surface.name,
+        base_color_factor: Vec3::splat(0.8).extend(1.0),
+        metallic_factor: 0.0,
+        double_sided: true,
+        ..Material::default()
+    };
+    for output in surface.outputs {
+        let place = texture(&folder.join(&output.file), scene)?;
+        match output.map.as_str() {
+            // With KTX2 and DDS of the same map, either will do.
+            "normal" => material.normal = Some(place),
+            "aniso" => material.aniso = Some(place),
+            "anisotropy" => {
+                material.anisotropy = Some(Anisotropy { strength: 1.0, rotation: 0.0, texture: Some(place) });
+            }
+            "roughness" => material.metallic_roughness = Some(place),
+            "orm" => {
+                material.metallic_factor = 1.0;
+                material.occlusion = Some(place.clone());
+                material.metallic_roughness = Some(place);
+            }
+            "color" => {
+                material.base_color_factor = Vec4::ONE;
+                material.base_color = Some(place);
+            }
+            other => scene.warnings.push(format!("{}: a map \"{other}\" is not drawn", output.file)),
+        }
+    }
+    Ok(material)
+}
+
+/// A baked texture in a scene. Its image is never looked at: white stands for it.
+fn texture(path: &Path, scene: &mut Scene) -> Result<TextureRef, Error> {
+    scene.textures.push(Some(Arc::new(read_texture(path)?)));
+    scene.images.push(Some(Arc::new(Image::new(1, 1, Channels::R, Pixels::U8(vec![255]))?)));
+    let index = scene.images.len() - 1;
+    Ok(TextureRef {
+        image: index,
+        runtime: Some(index),
+        uv_set: 0,
+        transform: Mat3::IDENTITY,
+        wrap: [Wrap::Repeat; 2],
+    })
+}
+
+/// A square about the origin, u right and v down.
+fn board(material: usize) -> Primitive {
+    let corners = [Vec2::new(0.0, 0.0), Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0), Vec2::new(1.0, 1.0)];
+    Primitive {
+        positions: corners.map(|uv| BOARD * Vec3::new(uv.x - 0.5, 0.5 - uv.y, 0.0)).to_vec(),
+        normals: vec![Vec3::Z; 4],
+        tangents: vec![Vec4::new(1.0, 0.0, 0.0, 1.0); 4],
+        uvs: [corners.to_vec(), Vec::new()],
+        colors: Vec::new(),
+        curvature: None,
+        triangles: vec![[0, 2, 1], [1, 2, 3]],
+        material,
+        source: Source::default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_a_model_only_when_it_holds_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let of = |path: &Path| Place::of(path).map_err(|e| e.to_string());
+        assert!(of(folder.path()).unwrap_err().contains("no .glb"));
+        std::fs::write(folder.path().join("a.kinran.json"), "").unwrap();
+        let sidecars = vec![folder.path().join("a.kinran.json")];
+        assert_eq!(of(folder.path()), Ok(Place::Textures(folder.path().into(), sidecars)));
+        assert!(Model::open(folder.path()).unwrap_err().to_string().contains("a.kinran.json"));
+        std::fs::write(folder.path().join("a.glb"), "").unwrap();
+        std::fs::write(folder.path().join("a.png"), "").unwrap();
+        assert_eq!(of(folder.path()), Ok(Place::File(folder.path().join("a.glb"))));
+        std::fs::write(folder.path().join("b.gltf"), "").unwrap();
+        assert!(of(folder.path()).unwrap_err().contains("2 models"));
+        assert!(of(&folder.path().join("c")).unwrap_err().contains("no such"));
+    }
+}
