@@ -512,8 +512,8 @@ impl App {
             if drag.hovered() || drag.dragged() {
                 ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
             }
-            self.parameters.split_at =
-                ((line + drag.drag_delta().x - rect.left()) / rect.width()).clamp(0.0, 1.0);
+            let moved = dragged(ui, &drag, egui::PointerButton::Primary).x;
+            self.parameters.split_at = ((line + moved - rect.left()) / rect.width()).clamp(0.0, 1.0);
         }
         // Without an orbit the model is framed: its camera sees all of it in a square.
         if let Some(model) = &self.model {
@@ -524,11 +524,11 @@ impl App {
             });
         }
         if let Some(orbit) = &mut self.parameters.orbit {
-            let delta = response.drag_delta();
-            if response.dragged_by(egui::PointerButton::Primary) {
-                orbit.turn(delta.x, delta.y);
-            } else if response.dragged() {
-                orbit.pan(delta.x / rect.height(), delta.y / rect.height());
+            let turned = dragged(ui, &response, egui::PointerButton::Primary);
+            orbit.turn(turned.x, turned.y);
+            for button in [egui::PointerButton::Secondary, egui::PointerButton::Middle] {
+                let moved = dragged(ui, &response, button) / rect.height();
+                orbit.pan(moved.x, moved.y);
             }
             if response.hovered() {
                 // Fifty points are a notch of most wheels.
@@ -721,6 +721,15 @@ impl eframe::App for App {
         self.loader.close();
         // A device that is lost draws nothing any more either.
         let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+    }
+}
+
+/// How far a button has dragged a part of the window since the last frame, in points; also in the frame that sees its release.
+fn dragged(ui: &egui::Ui, part: &egui::Response, button: egui::PointerButton) -> egui::Vec2 {
+    if part.dragged_by(button) || part.drag_stopped_by(button) {
+        ui.input(|input| input.pointer.delta())
+    } else {
+        egui::Vec2::ZERO
     }
 }
 
