@@ -30,6 +30,12 @@ impl F16 {
         self.map(|v| if v > o { v } else { o })
     }
 
+    /// The smaller in each lane.
+    #[inline(always)]
+    pub(crate) fn min_of(self, o: Self) -> Self {
+        F16(from_fn(|l| if self.0[l] < o.0[l] { self.0[l] } else { o.0[l] }))
+    }
+
     #[inline(always)]
     pub(crate) fn abs(self) -> Self {
         self.map(f32::abs)
@@ -38,6 +44,17 @@ impl F16 {
     #[inline(always)]
     pub(crate) fn recip(self) -> Self {
         self.map(|v| 1.0 / v)
+    }
+
+    #[inline(always)]
+    pub(crate) fn sqrt(self) -> Self {
+        self.map(f32::sqrt)
+    }
+
+    /// `yes` in lanes that are below zero, `no` in the others.
+    #[inline(always)]
+    pub(crate) fn where_negative(self, yes: Self, no: Self) -> Self {
+        F16(from_fn(|l| if self.0[l] < 0.0 { yes.0[l] } else { no.0[l] }))
     }
 }
 
@@ -84,6 +101,11 @@ impl V16 {
     }
 
     #[inline(always)]
+    pub(crate) fn cross(self, o: V16) -> V16 {
+        V16 { x: self.y * o.z - o.y * self.z, y: self.z * o.x - o.z * self.x, z: self.x * o.y - o.x * self.y }
+    }
+
+    #[inline(always)]
     pub(crate) fn lane(self, l: usize) -> Vec3 {
         vec3(self.x.0[l], self.y.0[l], self.z.0[l])
     }
@@ -94,6 +116,14 @@ impl Add for V16 {
     #[inline(always)]
     fn add(self, o: V16) -> V16 {
         V16 { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
+    }
+}
+
+impl Sub for V16 {
+    type Output = V16;
+    #[inline(always)]
+    fn sub(self, o: V16) -> V16 {
+        V16 { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod bake;
 mod footprint;
-mod lanes;
+pub(crate) mod lanes;
 mod levels;
 mod maps;
 mod ml;

@@ -13,9 +13,10 @@
 //! Both exponentials come from one Chebyshev series of one operator Y, an average over neighbours whose weights are
 //! not negative and sum to one. So constants stay exactly what they are, and spheres and cylinders keep their curvature.
 
-use super::faces::{frame, point_areas};
-use super::surface::{Fans, Welded, others};
-use glam::Vec3;
+use super::faces::{Corners, frame_tangents, turn};
+use super::surface::{Fans, Welded};
+use crate::aniso::lanes::{F16, LANES, V16};
+use glam::{Vec3, Vec4, Vec4Swizzles, vec4};
 use kinran_shading::Sym2;
 use rayon::prelude::*;
 
@@ -33,22 +34,32 @@ const RATE_QUANTILE: f64 = 0.98;
 /// it the blur of the finest places gets narrower.
 const EXPONENT_MAX: f64 = 20_000.0;
 
-/// One neighbour in a point's average.
+/// One neighbour in a point's average: its weight, the weight times cosine and sine of twice the angle that transport turns
+/// by, and the bits of its point's index; four numbers that are loaded at once.
 #[derive(Clone, Copy, Default)]
-struct Link {
-    point: u32,
-    weight: f32,
-    /// Weight times cosine and sine of twice the angle that transport turns by.
-    turn: [f32; 2],
+#[repr(align(16))]
+struct Link([f32; 4]);
+
+impl Link {
+    #[inline(always)]
+    fn point(&self) -> u32 {
+        self.0[3].to_bits()
+    }
+}
+
+/// The links of [`BAND`] points.
+struct Band {
+    /// Where each point's links end.
+    ends: Vec<u32>,
+    links: Vec<Link>,
+    /// What each point keeps of itself.
+    keep: Vec<f32>,
 }
 
 /// The averaging operator Y.
 struct Average {
-    starts: Vec<u32>,
-    links: Vec<Link>,
-    /// What a point keeps of itself.
-    keep: Vec<f32>,
-    /// Rate of exchange that Y's links stand for, 1 over the mesh's unit squared.
+    bands: Vec<Band>,
+    /// Rate of exchange that Y's links stand for, 1 over the unit squared.
     rate: f64,
 }
 
@@ -60,70 +71,76 @@ pub(crate) fn blur(
     tensors: &mut [Sym2],
     deviations: &[f64],
 ) {
+    // Lengths in the unit in which the model is about one large.
+    let scale = surface.unit_scale();
+    let deviations: Vec<f64> = deviations.iter().map(|d| d * f64::from(scale)).collect();
     let longest = deviations.iter().copied().fold(0.0, f64::max);
     if longest <= 0.0 {
         return;
     }
-    let average = Average::new(surface, fans, normals, 0.5 * longest * longest);
+    let average = Average::new(surface, fans, normals, scale, 0.5 * longest * longest);
     if average.rate <= 0.0 {
         return;
     }
-    let series = coefficients(deviations, average.rate);
+    let series = coefficients(&deviations, average.rate);
 
     // Trace half, and the deviator as a complex number.
-    let start: Vec<[f32; 3]> =
-        tensors.iter().map(|t| [0.5 * (t.xx + t.yy), 0.5 * (t.xx - t.yy), t.xy]).collect();
-    let mut sum: Vec<[f32; 3]> = start.iter().map(|s| s.map(|x| series[0] * x)).collect();
+    let start: Vec<Vec4> =
+        tensors.iter().map(|t| vec4(0.5 * (t.xx + t.yy), 0.5 * (t.xx - t.yy), t.xy, 0.0)).collect();
+    let mut sum: Vec<Vec4> = start.iter().map(|&s| series[0] * s).collect();
     let mut before = start;
-    let mut now = vec![[0.0f32; 3]; before.len()];
+    let mut now = vec![Vec4::ZERO; before.len()];
     average.step(&before, &mut now, &mut sum, series.get(1).copied().unwrap_or(0.0));
     for &coefficient in &series[2.min(series.len())..] {
         // T(k+1) = 2 Y T(k) - T(k-1), written over T(k-1).
         average.step_over(&now, &mut before, &mut sum, coefficient);
         std::mem::swap(&mut before, &mut now);
     }
-    for (tensor, [half, real, imaginary]) in tensors.iter_mut().zip(sum) {
-        *tensor = Sym2 { xx: half + real, xy: imaginary, yy: half - real };
+    for (tensor, sum) in tensors.iter_mut().zip(sum) {
+        *tensor = Sym2 { xx: sum.x + sum.y, xy: sum.z, yy: sum.x - sum.y };
     }
 }
 
 impl Average {
-    fn new(surface: &Welded, fans: &Fans, normals: &[Vec3], time: f64) -> Self {
+    fn new(surface: &Welded, fans: &Fans, normals: &[Vec3], scale: f32, time: f64) -> Self {
         let points = surface.positions.len();
-        let areas = point_areas(surface);
+        let mut areas = vec![0.0f32; points];
+        let mut cotangents = vec![[0.0f32; 3]; surface.triangles.len()];
+        pulp::Arch::new().dispatch(Cotangents {
+            surface,
+            scale,
+            cotangents: &mut cotangents,
+            areas: &mut areas,
+        });
 
-        // Neighbours in the order in which they are met around the point, with cotangent weights.
-        let bands: Vec<(Vec<u32>, Vec<Link>)> = (0..points.div_ceil(BAND))
+        // Neighbours in the order in which they are met around the point, with cotangent weights, and rates.
+        let gathered: Vec<(Band, Vec<f64>)> = (0..points.div_ceil(BAND))
             .into_par_iter()
             .map(|band| {
-                let mut counts = Vec::with_capacity(BAND);
-                let mut links: Vec<Link> = Vec::with_capacity(7 * BAND);
-                for point in band * BAND..points.min((band + 1) * BAND) {
-                    let first = links.len();
-                    gather(surface, fans, normals, point, &mut links);
-                    counts.push((links.len() - first) as u32);
+                let range = band * BAND..points.min((band + 1) * BAND);
+                let mut links: Vec<Link> = Vec::with_capacity(7 * range.len());
+                let mut owners: Vec<u32> = Vec::with_capacity(7 * range.len());
+                let mut ends = Vec::with_capacity(range.len());
+                for point in range.clone() {
+                    gather(surface, fans, &cotangents, point as u32, &mut links);
+                    owners.resize(links.len(), point as u32);
+                    ends.push(links.len() as u32);
                 }
-                (counts, links)
+                pulp::Arch::new().dispatch(Transport { normals, owners: &owners, links: &mut links });
+                links.shrink_to_fit();
+                let band = Band { ends, links, keep: Vec::new() };
+                let rates = (range.zip(band.by_point())).map(|(point, links)| {
+                    let sum: f64 = links.iter().map(|l| f64::from(l.0[0])).sum();
+                    if sum > 0.0 { sum / f64::from(areas[point]).max(f64::MIN_POSITIVE) } else { 0.0 }
+                });
+                let rates = rates.collect();
+                (band, rates)
             })
             .collect();
-        let mut starts = Vec::with_capacity(points + 1);
-        let mut links = Vec::with_capacity(bands.iter().map(|(_, links)| links.len()).sum());
-        starts.push(0u32);
-        for (counts, band) in bands {
-            for count in counts {
-                starts.push(starts[starts.len() - 1] + count);
-            }
-            links.extend(band);
-        }
 
-        // Rates, the largest of them lowered.
-        let rate_of = |point: usize| -> f64 {
-            let links = &links[starts[point] as usize..starts[point + 1] as usize];
-            let sum: f64 = links.iter().map(|l| f64::from(l.weight)).sum();
-            if sum > 0.0 { sum / f64::from(areas[point]).max(f64::MIN_POSITIVE) } else { 0.0 }
-        };
-        let rates: Vec<f64> = (0..points).map(rate_of).collect();
-        let mut sorted: Vec<f64> = rates.iter().copied().filter(|&r| r > 0.0).collect();
+        // The largest of the rates are lowered.
+        let mut sorted: Vec<f64> =
+            gathered.iter().flat_map(|(_, rates)| rates).copied().filter(|&r| r > 0.0).collect();
         let rate = if sorted.is_empty() {
             0.0
         } else {
@@ -133,106 +150,167 @@ impl Average {
         let rate = rate.min(EXPONENT_MAX / time);
 
         // Y = 1 - L / rate.
-        let mut keep = Vec::with_capacity(points);
-        for point in 0..points {
-            let links = &mut links[starts[point] as usize..starts[point + 1] as usize];
-            let total: f64 = links.iter().map(|l| f64::from(l.weight)).sum();
-            let given = if rate > 0.0 { (rates[point] / rate).min(1.0) } else { 0.0 };
-            let scale = if total > 0.0 { (given / total) as f32 } else { 0.0 };
-            for link in links.iter_mut() {
-                link.weight *= scale;
-                link.turn = link.turn.map(|x| x * link.weight);
+        let weigh = |(mut band, rates): (Band, Vec<f64>)| {
+            let mut first = 0;
+            band.keep.reserve_exact(rates.len());
+            for (own, &end) in rates.into_iter().zip(&band.ends) {
+                let links = &mut band.links[first..end as usize];
+                first = end as usize;
+                let total: f64 = links.iter().map(|l| f64::from(l.0[0])).sum();
+                let given = if rate > 0.0 { (own / rate).min(1.0) } else { 0.0 };
+                let scale = if total > 0.0 { (given / total) as f32 } else { 0.0 };
+                for Link([weight, cos, sin, _]) in links.iter_mut() {
+                    *weight *= scale;
+                    (*cos, *sin) = (*cos * *weight, *sin * *weight);
+                }
+                band.keep.push(1.0 - links.iter().map(|l| l.0[0]).sum::<f32>());
             }
-            keep.push(1.0 - links.iter().map(|l| l.weight).sum::<f32>());
-        }
-        Self { starts, links, keep, rate }
-    }
-
-    /// The average at a point.
-    #[inline(always)]
-    fn at(&self, point: usize, from: &[[f32; 3]]) -> [f32; 3] {
-        let own = from[point];
-        let keep = self.keep[point];
-        let mut sum = own.map(|x| keep * x);
-        for link in &self.links[self.starts[point] as usize..self.starts[point + 1] as usize] {
-            let [half, real, imaginary] = from[link.point as usize];
-            let [cos, sin] = link.turn;
-            sum[0] += link.weight * half;
-            sum[1] += cos * real - sin * imaginary;
-            sum[2] += sin * real + cos * imaginary;
-        }
-        sum
+            band
+        };
+        Self { bands: gathered.into_par_iter().map(weigh).collect(), rate }
     }
 
     /// `to = Y from`, and its part of the sum.
-    fn step(&self, from: &[[f32; 3]], to: &mut [[f32; 3]], sum: &mut [[f32; 3]], coefficient: f32) {
-        (to.par_chunks_mut(BAND).zip(sum.par_chunks_mut(BAND)).enumerate()).for_each(|(band, (to, sum))| {
-            for (i, (to, sum)) in to.iter_mut().zip(sum).enumerate() {
-                *to = self.at(band * BAND + i, from);
-                (0..3).for_each(|c| sum[c] += coefficient * to[c]);
-            }
+    fn step(&self, from: &[Vec4], to: &mut [Vec4], sum: &mut [Vec4], coefficient: f32) {
+        self.each(from, to, sum, |average, to, sum| {
+            *to = average;
+            *sum += coefficient * average;
         });
     }
 
     /// `over = 2 Y from - over`, and its part of the sum.
-    fn step_over(&self, from: &[[f32; 3]], over: &mut [[f32; 3]], sum: &mut [[f32; 3]], coefficient: f32) {
-        (over.par_chunks_mut(BAND).zip(sum.par_chunks_mut(BAND)).enumerate()).for_each(
-            |(band, (over, sum))| {
-                for (i, (over, sum)) in over.iter_mut().zip(sum).enumerate() {
-                    let average = self.at(band * BAND + i, from);
-                    for c in [0, 1, 2] {
-                        over[c] = 2.0 * average[c] - over[c];
-                        sum[c] += coefficient * over[c];
-                    }
-                }
-            },
-        );
+    fn step_over(&self, from: &[Vec4], over: &mut [Vec4], sum: &mut [Vec4], coefficient: f32) {
+        self.each(from, over, sum, |average, over, sum| {
+            *over = 2.0 * average - *over;
+            *sum += coefficient * *over;
+        });
+    }
+
+    /// Hands the average at each point to `f`, beside the point's places in `to` and `sum`.
+    fn each(
+        &self,
+        from: &[Vec4],
+        to: &mut [Vec4],
+        sum: &mut [Vec4],
+        f: impl Fn(Vec4, &mut Vec4, &mut Vec4) + Sync,
+    ) {
+        let places = to.par_chunks_mut(BAND).zip(sum.par_chunks_mut(BAND)).zip(from.par_chunks(BAND));
+        places.zip(&self.bands).for_each(|(((to, sum), own), band)| {
+            let places = to.iter_mut().zip(sum).zip(own);
+            for (((to, sum), &own), (links, &keep)) in places.zip(band.by_point().zip(&band.keep)) {
+                f(average(from, own, links, keep), to, sum);
+            }
+        });
     }
 }
 
-/// A point's neighbours: half the sum of cotangents opposite to each edge, negative sums as zero, and the turn, not yet
-/// multiplied with the weight.
-fn gather(surface: &Welded, fans: &Fans, normals: &[Vec3], point: usize, links: &mut Vec<Link>) {
-    let first = links.len();
-    let here = surface.positions[point].as_dvec3();
-    for &triangle in fans.around(point) {
-        let (a, b) = others(surface.triangles[triangle as usize], point as u32);
-        let (pa, pb) = (surface.positions[a as usize].as_dvec3(), surface.positions[b as usize].as_dvec3());
-        let (to_a, to_b, across) = (pa - here, pb - here, pb - pa);
-        let double_area = to_a.cross(to_b).length();
-        if a == b || a as usize == point || b as usize == point || double_area <= 0.0 {
-            continue;
-        }
-        // Opposite to the edge to a lies b, and the other way round.
-        let halves = [(a, to_b.dot(across) / double_area), (b, -to_a.dot(across) / double_area)];
-        for (other, cotangent) in halves {
-            let half = 0.5 * cotangent as f32;
-            match links[first..].iter_mut().find(|link| link.point == other) {
-                Some(link) => link.weight += half,
-                None => links.push(Link { point: other, weight: half, turn: [1.0, 0.0] }),
+impl Band {
+    /// The links of each point.
+    fn by_point(&self) -> impl Iterator<Item = &[Link]> {
+        let mut first = 0;
+        self.ends.iter().map(move |&end| {
+            let links = &self.links[first..end as usize];
+            first = end as usize;
+            links
+        })
+    }
+}
+
+/// The average at a point that holds `own`: traces by weight, deviators turned on the way.
+#[inline(always)]
+fn average(from: &[Vec4], own: Vec4, links: &[Link], keep: f32) -> Vec4 {
+    let (mut along, mut across) = (keep * own, Vec4::ZERO);
+    for link in links {
+        let (link, other) = (Vec4::from_array(link.0), from[link.point() as usize]);
+        along += link.xyyx() * other;
+        across += link.zzzz() * other;
+    }
+    along + across.wzyw() * vec4(0.0, -1.0, 1.0, 0.0)
+}
+
+/// Halves of the cotangents at the corners of triangles, and the Voronoi areas of points.
+struct Cotangents<'a> {
+    surface: &'a Welded,
+    scale: f32,
+    cotangents: &'a mut [[f32; 3]],
+    areas: &'a mut [f32],
+}
+
+impl pulp::WithSimd for Cotangents<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { surface, scale, cotangents, areas } = self;
+        for (triangles, out) in surface.triangles.chunks(LANES).zip(cotangents.chunks_mut(LANES)) {
+            let corners = Corners::gather(&surface.positions, triangles, scale);
+            let (halves, parts) = (corners.half_cotangents(), corners.areas());
+            for (l, (triangle, out)) in triangles.iter().zip(out).enumerate() {
+                if !corners.has_area(l) {
+                    continue;
+                }
+                for c in 0..3 {
+                    out[c] = halves[c].0[l];
+                    areas[triangle[c] as usize] += parts[c].0[l];
+                }
             }
         }
     }
-    let n = normals[point];
-    let (t, b) = frame(n);
-    for link in &mut links[first..] {
-        let other = normals[link.point as usize];
-        let one_plus = 1.0 + n.dot(other);
-        // A fold back onto itself has no shortest arc, a point without a normal no frame.
-        if link.weight.is_nan()
-            || link.weight <= 0.0
-            || one_plus < 1e-3
-            || n == Vec3::ZERO
-            || other == Vec3::ZERO
-        {
-            link.weight = 0.0;
+}
+
+/// A point's neighbours: half the sum of cotangents opposite to each edge.
+fn gather(surface: &Welded, fans: &Fans, cotangents: &[[f32; 3]], point: u32, links: &mut Vec<Link>) {
+    let first = links.len();
+    for &triangle in fans.around(point as usize) {
+        let (corners, halves) = (surface.triangles[triangle as usize], cotangents[triangle as usize]);
+        let Some(at) = corners.iter().position(|&c| c == point) else { continue };
+        let (next, last) = ((at + 1) % 3, (at + 2) % 3);
+        if corners[next] == corners[last] || corners[next] == point || corners[last] == point {
             continue;
         }
-        let (tangent, _) = frame(other);
-        let turned = tangent - (n + other) * (n.dot(tangent) / one_plus);
-        let (cos, sin) = (turned.dot(t), turned.dot(b));
-        let inverse = (cos * cos + sin * sin).recip();
-        link.turn = [(cos * cos - sin * sin) * inverse, 2.0 * cos * sin * inverse];
+        // Opposite to the edge to one of the others lies the other one.
+        for (other, half) in [(corners[next], halves[last]), (corners[last], halves[next])] {
+            match links[first..].iter_mut().find(|link| link.point() == other) {
+                Some(link) => link.0[0] += half,
+                None => links.push(Link([half, 1.0, 0.0, f32::from_bits(other)])),
+            }
+        }
+    }
+}
+
+/// How far each link turns, not yet multiplied with its weight; weights of links that cannot be are made zero: negative
+/// sums of cotangents, folds of a surface back onto itself, which no shortest arc opens, and points without a normal.
+struct Transport<'a> {
+    normals: &'a [Vec3],
+    /// The point that each link belongs to.
+    owners: &'a [u32],
+    links: &'a mut [Link],
+}
+
+impl pulp::WithSimd for Transport<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        for (owners, links) in self.owners.chunks(LANES).zip(self.links.chunks_mut(LANES)) {
+            let (mut here, mut there) = (V16::default(), V16::default());
+            for (l, (&owner, link)) in owners.iter().zip(&*links).enumerate() {
+                let (n, o) = (self.normals[owner as usize], self.normals[link.point() as usize]);
+                (here.x.0[l], here.y.0[l], here.z.0[l]) = (n.x, n.y, n.z);
+                (there.x.0[l], there.y.0[l], there.z.0[l]) = (o.x, o.y, o.z);
+            }
+            let tangent = frame_tangents(here);
+            let (cos, sin) = turn(there, frame_tangents(there), here, tangent, here.cross(tangent));
+            let inverse = (cos * cos + sin * sin).recip();
+            let double = [(cos * cos - sin * sin) * inverse, (cos * sin + cos * sin) * inverse];
+            let one_plus = F16::splat(1.0) + here.dot(there);
+            let lengths = here.dot(here).min_of(there.dot(there));
+            for (l, link) in links.iter_mut().enumerate() {
+                let fits = link.0[0] > 0.0 && one_plus.0[l] >= 1e-3 && lengths.0[l] > 0.0;
+                let numbers = if fits { [link.0[0], double[0].0[l], double[1].0[l]] } else { [0.0; 3] };
+                link.0[..3].copy_from_slice(&numbers);
+            }
+        }
     }
 }
 

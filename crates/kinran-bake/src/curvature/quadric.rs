@@ -30,7 +30,14 @@ const NEIGHBOURS_MAX: usize = 64;
 /// Points of one piece of work.
 const BAND: usize = 4096;
 
-/// Tensors of points as [`face_tensors`](super::faces::face_tensors) gives them, and which points could not be fitted and
+/// Points that are fitted at once.
+const LANES: usize = 8;
+
+/// A number of each of the points that are fitted at once. Double precision: normal equations of cubic terms lose half of
+/// the digits.
+type Lanes = [f64; LANES];
+
+/// Tensors of points as [`face_tensors`](super::faces::face_tensors) gives them, and how many points could not be fitted and
 /// keep the given ones.
 pub(crate) fn quadric_tensors(
     surface: &Welded,
@@ -38,31 +45,80 @@ pub(crate) fn quadric_tensors(
     normals: &[Vec3],
     tensors: &mut [Sym2],
 ) -> usize {
-    (tensors.par_chunks_mut(BAND).enumerate())
-        .map(|(band, tensors)| {
-            let mut ring = Ring { points: Vec::with_capacity(NEIGHBOURS_MAX) };
-            let mut unfitted = 0;
-            for (i, tensor) in tensors.iter_mut().enumerate() {
-                match ring.fit(surface, fans, normals, band * BAND + i) {
-                    Some(fitted) => *tensor = fitted,
-                    None => unfitted += 1,
-                }
-            }
-            unfitted
-        })
-        .sum()
+    let points = surface.positions.len();
+    let rings = || Rings { seen: vec![u32::MAX; points], points: Vec::with_capacity(NEIGHBOURS_MAX) };
+    let bands = tensors.par_chunks_mut(BAND).enumerate();
+    let unfitted = bands.map_init(rings, |rings, (band, tensors)| {
+        let first = band * BAND;
+        pulp::Arch::new().dispatch(FitBand { surface, fans, normals, rings, first, tensors })
+    });
+    unfitted.sum()
 }
 
-/// A point's neighbours.
-struct Ring {
+struct FitBand<'a> {
+    surface: &'a Welded,
+    fans: &'a Fans,
+    normals: &'a [Vec3],
+    rings: &'a mut Rings,
+    first: usize,
+    tensors: &'a mut [Sym2],
+}
+
+impl pulp::WithSimd for FitBand<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> usize {
+        let mut unfitted = 0;
+        let mut group =
+            Group { local: [[[0.0; LANES]; 3]; NEIGHBOURS_MAX], counts: [0; LANES], inverse: [0.0; LANES] };
+        for (i, tensors) in self.tensors.chunks_mut(LANES).enumerate() {
+            group.counts = [0; LANES];
+            for l in 0..tensors.len() {
+                let point = self.first + i * LANES + l;
+                if self.normals[point] != Vec3::ZERO {
+                    self.rings.collect(self.surface, self.fans, point);
+                    group.place(l, self.surface, self.normals, &self.rings.points);
+                }
+            }
+            let neighbours = group.pad();
+            let (cubic, solved) = solve::<CUBIC>(&group.local[..neighbours]);
+            let mut missed = [false; LANES];
+            for (l, tensor) in tensors.iter_mut().enumerate() {
+                missed[l] = !solved[l] || group.counts[l] < ENOUGH;
+                if !missed[l] {
+                    *tensor = weingarten(&cubic, l, group.inverse[l]);
+                }
+            }
+            if missed.contains(&true) {
+                let (quadratic, solved) = solve::<QUADRATIC>(&group.local[..neighbours]);
+                for (l, tensor) in tensors.iter_mut().enumerate().filter(|(l, _)| missed[*l]) {
+                    if solved[l] && group.counts[l] >= QUADRATIC {
+                        *tensor = weingarten(&quadratic, l, group.inverse[l]);
+                    } else {
+                        unfitted += 1;
+                    }
+                }
+            }
+        }
+        unfitted
+    }
+}
+
+/// Neighbours of a point.
+struct Rings {
+    /// For each point of the surface the last one whose neighbour it was.
+    seen: Vec<u32>,
     points: Vec<u32>,
 }
 
-impl Ring {
+impl Rings {
     /// Collects rings until there are enough neighbours; the point itself comes first.
     fn collect(&mut self, surface: &Welded, fans: &Fans, point: usize) {
+        let mark = point as u32;
         self.points.clear();
-        self.points.push(point as u32);
+        self.points.push(mark);
+        self.seen[point] = mark;
         let mut from = 0;
         for ring in 0..RINGS_MAX {
             let to = self.points.len();
@@ -71,7 +127,8 @@ impl Ring {
                 for &triangle in fans.around(center as usize) {
                     let (a, b) = others(surface.triangles[triangle as usize], center);
                     for other in [a, b] {
-                        if !self.points.contains(&other) && self.points.len() < NEIGHBOURS_MAX {
+                        if self.seen[other as usize] != mark && self.points.len() < NEIGHBOURS_MAX {
+                            self.seen[other as usize] = mark;
                             self.points.push(other);
                         }
                     }
@@ -83,55 +140,62 @@ impl Ring {
             from = to;
         }
     }
+}
 
-    fn fit(&mut self, surface: &Welded, fans: &Fans, normals: &[Vec3], point: usize) -> Option<Sym2> {
+/// The neighbours of the points that are fitted at once, each in the frame of its point's normal and in units of the
+/// farthest one's distance.
+struct Group {
+    local: [[Lanes; 3]; NEIGHBOURS_MAX],
+    counts: [usize; LANES],
+    /// One over that distance.
+    inverse: Lanes,
+}
+
+impl Group {
+    /// Puts the neighbours of the first of `points` into a lane; those that face away belong to another side.
+    #[inline(always)]
+    fn place(&mut self, l: usize, surface: &Welded, normals: &[Vec3], points: &[u32]) {
+        let point = points[0] as usize;
         let normal = normals[point];
-        if normal == Vec3::ZERO {
-            return None;
-        }
-        self.collect(surface, fans, point);
         let (t, b) = frame(normal);
         let (n, t, b) = (normal.as_dvec3(), t.as_dvec3(), b.as_dvec3());
         let origin = surface.positions[point].as_dvec3();
-
-        // Neighbours in the frame, in units of the farthest; those that face away belong to another side.
-        let mut local = [[0.0f64; 3]; NEIGHBOURS_MAX];
         let (mut count, mut farthest) = (0, 0.0f64);
-        for &other in &self.points[1..] {
+        for &other in &points[1..] {
             if normals[other as usize].dot(normal) <= 0.0 {
                 continue;
             }
             let d = surface.positions[other as usize].as_dvec3() - origin;
-            local[count] = [d.dot(t), d.dot(b), d.dot(n)];
+            for (to, axis) in self.local[count].iter_mut().zip([t, b, n]) {
+                to[l] = d.dot(axis);
+            }
             farthest = farthest.max(d.length_squared());
             count += 1;
         }
-        if farthest <= 0.0 {
-            return None;
-        }
-        let inverse = farthest.sqrt().recip();
-        let local = &mut local[..count];
-        for p in local.iter_mut() {
-            *p = p.map(|x| x * inverse);
-        }
+        self.counts[l] = if farthest > 0.0 { count } else { 0 };
+        self.inverse[l] = if farthest > 0.0 { farthest.sqrt().recip() } else { 0.0 };
+    }
 
-        let cubic = if count >= ENOUGH {
-            solve::<CUBIC>(local).map(|c| [c[0], c[1], c[2], c[3], c[4]])
-        } else {
-            None
-        };
-        let [d, e, xx, xy, yy] = match cubic {
-            Some(coefficients) => coefficients,
-            None if count >= QUADRATIC => solve::<QUADRATIC>(local)?,
-            None => return None,
-        };
-        Some(weingarten(d, e, xx, xy, yy, inverse))
+    /// Scales what was placed, and fills lanes with zeros, which change no sum, up to the longest; its number of
+    /// neighbours.
+    #[inline(always)]
+    fn pad(&mut self) -> usize {
+        let longest = self.counts.iter().copied().max().unwrap_or(0);
+        for (i, place) in self.local[..longest].iter_mut().enumerate() {
+            for axis in place {
+                for (l, x) in axis.iter_mut().enumerate() {
+                    *x = if i < self.counts[l] { *x * self.inverse[l] } else { 0.0 };
+                }
+            }
+        }
+        longest
     }
 }
 
 /// The shape operator of the graph at the origin, in the frame of the given normal: the one of the fitted tangent plane,
 /// turned back by the shortest arc.
-fn weingarten(d: f64, e: f64, xx: f64, xy: f64, yy: f64, inverse: f64) -> Sym2 {
+fn weingarten(coefficients: &[Lanes], l: usize, inverse: f64) -> Sym2 {
+    let [d, e, xx, xy, yy] = [0, 1, 2, 3, 4].map(|i| coefficients[i][l]);
     // Second form over the length of the normal, convex positive.
     let squared = 1.0 + d * d + e * e;
     let scale = -inverse / squared.sqrt();
@@ -150,50 +214,88 @@ fn weingarten(d: f64, e: f64, xx: f64, xy: f64, yy: f64, inverse: f64) -> Sym2 {
     Sym2 { xx: form(u, u) as f32, xy: form(u, v) as f32, yy: form(v, v) as f32 }
 }
 
+/// `to += a b` in every lane.
+#[inline(always)]
+fn add_product(to: &mut Lanes, a: Lanes, b: Lanes) {
+    for (l, to) in to.iter_mut().enumerate() {
+        *to += a[l] * b[l];
+    }
+}
+
+/// `to -= a b` in every lane.
+#[inline(always)]
+fn subtract_product(to: &mut Lanes, a: Lanes, b: Lanes) {
+    for (l, to) in to.iter_mut().enumerate() {
+        *to -= a[l] * b[l];
+    }
+}
+
+/// `to *= a` in every lane.
+#[inline(always)]
+fn multiply(to: &mut Lanes, a: Lanes) {
+    for (l, to) in to.iter_mut().enumerate() {
+        *to *= a[l];
+    }
+}
+
 /// Least squares of `z` on `x, y, x²/2, xy, y²/2` and, with nine coefficients, the cubic monomials: normal equations by
-/// Cholesky. `None` where the points do not determine them.
-fn solve<const N: usize>(points: &[[f64; 3]]) -> Option<[f64; N]> {
-    let mut matrix = [[0.0f64; N]; N];
-    let mut right = [0.0f64; N];
-    for &[x, y, z] in points {
-        let all = [x, y, 0.5 * x * x, x * y, 0.5 * y * y, x * x * x, x * x * y, x * y * y, y * y * y];
+/// Cholesky, in every lane. Also whether the neighbours determine them.
+#[inline(always)]
+fn solve<const N: usize>(neighbours: &[[Lanes; 3]]) -> ([Lanes; N], [bool; LANES]) {
+    let mut matrix = [[[0.0f64; LANES]; N]; N];
+    let mut right = [[0.0f64; LANES]; N];
+    for [x, y, z] in neighbours {
+        let mut all = [[0.0f64; LANES]; CUBIC];
+        for l in 0..LANES {
+            let (x, y) = (x[l], y[l]);
+            let (x2, xy, y2) = (x * x, x * y, y * y);
+            let monomials = [x, y, 0.5 * x2, xy, 0.5 * y2, x2 * x, x2 * y, x * y2, y2 * y];
+            for (all, monomial) in all.iter_mut().zip(monomials) {
+                all[l] = monomial;
+            }
+        }
         for i in 0..N {
-            right[i] += all[i] * z;
+            add_product(&mut right[i], all[i], *z);
             // Row i from the diagonal on.
             for j in i..N {
-                matrix[i][j] += all[i] * all[j];
+                add_product(&mut matrix[i][j], all[i], all[j]);
             }
         }
     }
+    let mut solved = [true; LANES];
     for i in 0..N {
         let before = matrix[i][i];
         for k in 0..i {
-            matrix[i][i] -= matrix[k][i] * matrix[k][i];
+            let above = matrix[k][i];
+            subtract_product(&mut matrix[i][i], above, above);
         }
-        // Below, the column is a combination of those before it to all digits that count.
-        if matrix[i][i] <= 1e-9 * before || before <= 0.0 {
-            return None;
+        for (l, pivot) in matrix[i][i].iter_mut().enumerate() {
+            // Below, the column is a combination of those before it to all digits that count.
+            solved[l] &= *pivot > 1e-9 * before[l];
+            *pivot = 1.0 / pivot.sqrt();
         }
-        let inverse = matrix[i][i].sqrt().recip();
-        matrix[i][i] = inverse;
         for j in i + 1..N {
             for k in 0..i {
-                matrix[i][j] -= matrix[k][i] * matrix[k][j];
+                let (a, b) = (matrix[k][i], matrix[k][j]);
+                subtract_product(&mut matrix[i][j], a, b);
             }
-            matrix[i][j] *= inverse;
+            let pivot = matrix[i][i];
+            multiply(&mut matrix[i][j], pivot);
         }
     }
     for i in 0..N {
         for k in 0..i {
-            right[i] -= matrix[k][i] * right[k];
+            let known = right[k];
+            subtract_product(&mut right[i], matrix[k][i], known);
         }
-        right[i] *= matrix[i][i];
+        multiply(&mut right[i], matrix[i][i]);
     }
     for i in (0..N).rev() {
         for k in i + 1..N {
-            right[i] -= matrix[i][k] * right[k];
+            let known = right[k];
+            subtract_product(&mut right[i], matrix[i][k], known);
         }
-        right[i] *= matrix[i][i];
+        multiply(&mut right[i], matrix[i][i]);
     }
-    Some(right)
+    (right, solved)
 }

@@ -15,6 +15,15 @@ pub(crate) struct Welded {
     pub(crate) triangles: Vec<[u32; 3]>,
 }
 
+impl Welded {
+    /// A power of two that makes the largest coordinate about one, whatever the unit is; exact to multiply with.
+    pub(crate) fn unit_scale(&self) -> f32 {
+        let largest = self.positions.iter().fold(0.0f32, |m, p| m.max(p.abs().max_element()));
+        // A power that single precision holds, as is its square.
+        libm::scalbnf(1.0, -libm::frexpf(largest).1.clamp(-60, 60))
+    }
+}
+
 /// Joins vertices of bitwise equal positions (0 and -0 are equal) whose `normals`, where there are any, do not oppose
 /// each other. Points stand in the order of their first vertices.
 pub(crate) fn weld(positions: &[Vec3], normals: Option<&[Vec3]>, triangles: &[[u32; 3]]) -> Welded {
