@@ -166,6 +166,14 @@ impl<'a> RadialProfile<'a> {
         }
     }
 
+    /// d of each channel in millimetres, where the profile is Burley's: all such profiles are one, stretched.
+    pub fn burley_lengths(&self) -> Option<[f64; 3]> {
+        match self.0 {
+            Shape::Burley(d) => Some(d),
+            _ => None,
+        }
+    }
+
     /// The same profile against the distance from a line.
     pub fn to_linear(self) -> LinearProfile<'a> {
         LinearProfile(self.0)
@@ -226,32 +234,34 @@ impl<'a> LinearProfile<'a> {
                     0.5 * (y * r + curved)
                 };
                 let mut sum = [0.0; 3];
-                let mut add = |r0: f64, r1: f64, a: [f64; 3], b: [f64; 3]| {
-                    let (r0, r1) = (r0.max(x), r1.max(x));
-                    let (y0, y1) = (along(r0), along(r1));
-                    let of_r = integral_of_r(r1, y1) - integral_of_r(r0, y0);
+                // Each piece begins where the last one ended.
+                let (mut y0, mut before) = (0.0, integral_of_r(x, 0.0));
+                let mut add = |r1: f64, a: [f64; 3], b: [f64; 3]| {
+                    let r1 = r1.max(x);
+                    let y1 = along(r1);
+                    let after = integral_of_r(r1, y1);
                     for c in [0, 1, 2] {
-                        sum[c] += 2.0 * (a[c] * (y1 - y0) + b[c] * of_r);
+                        sum[c] += 2.0 * (a[c] * (y1 - y0) + b[c] * (after - before));
                     }
+                    (y0, before) = (y1, after);
                 };
-                add(0.0, rows[0].0, rows[0].1, [0.0; 3]);
+                add(rows[0].0, rows[0].1, [0.0; 3]);
                 for pair in rows.windows(2).filter(|pair| pair[1].0 > x) {
                     let ((r0, d0), (r1, d1)) = (pair[0], pair[1]);
                     let b = each(|c| (d1[c] - d0[c]) / (r1 - r0));
-                    add(r0, r1, each(|c| d0[c] - b[c] * r0), b);
+                    add(r1, each(|c| d0[c] - b[c] * r0), b);
                 }
                 sum
             }
             Shape::Sampled { values, reach } => {
                 let last = values.len() - 1;
-                let at = sqrt(x / reach) * last as f64;
-                if at >= last as f64 {
+                if x >= reach {
                     return values[last].map(|v| if x > reach { 0.0 } else { v });
                 }
                 // Straight in the distance, not in its root.
-                let i = at as usize;
-                let distance = |i: usize| reach * (i * i) as f64 / (last * last) as f64;
-                let t = (x - distance(i)) / (distance(i + 1) - distance(i));
+                let squared = x / reach * (last * last) as f64;
+                let i = (sqrt(squared) as usize).min(last - 1);
+                let t = (squared - (i * i) as f64) / (2 * i + 1) as f64;
                 each(|c| values[i][c] + t * (values[i + 1][c] - values[i][c]))
             }
         }

@@ -11,7 +11,7 @@
 use super::bessel::{scaled_i0, scaled_i1};
 use super::profile::{Gaussian, LinearProfile, Shape};
 use core::f64::consts::PI;
-use libm::{asin, cos, exp, sin, sqrt};
+use libm::{asin, cos, exp, sincos, sqrt};
 
 /// Nodes and weights of the Gauss–Legendre rule of four points on [-1, 1].
 const GAUSS_LEGENDRE: [(f64, f64); 4] = [
@@ -20,6 +20,11 @@ const GAUSS_LEGENDRE: [(f64, f64); 4] = [
     (0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
     (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
 ];
+
+/// The rule of two points, for pieces so short that its error, a 4320th of their length to the fifth times the fourth
+/// derivative, is below 1e-8 of their mass.
+const GAUSS_LEGENDRE_SHORT: [(f64, f64); 2] =
+    [(-0.577_350_269_189_625_8, 1.0), (0.577_350_269_189_625_8, 1.0)];
 
 /// Below this curvature (1/mm; a radius of a kilometre) a surface is flat.
 const FLAT: f64 = 1e-6;
@@ -110,18 +115,22 @@ impl Cumulative<'_, '_> {
         // Pieces double in length away from the pole and stay within what four points resolve.
         while self.at < to && self.at < end {
             let next = to.min(2.0 * self.at).min(self.at + shortest.min(0.1));
-            self.piece(self.at, next);
+            if next - self.at < 0.125 * shortest.min(0.1).min(self.at) {
+                self.piece(self.at, next, &GAUSS_LEGENDRE_SHORT);
+            } else {
+                self.piece(self.at, next, &GAUSS_LEGENDRE);
+            }
             self.at = next;
         }
         self.at = self.at.max(to);
     }
 
-    fn piece(&mut self, a: f64, b: f64) {
+    fn piece(&mut self, a: f64, b: f64, rule: &[(f64, f64)]) {
         let (half, middle) = (0.5 * (b - a), 0.5 * (a + b));
-        for (node, weight) in GAUSS_LEGENDRE {
-            let angle = middle + half * node;
-            let density = self.profile.density(2.0 * self.r * sin(0.5 * angle));
-            let (sin, cos) = (sin(angle), cos(angle));
+        for (node, weight) in rule {
+            let (s, c) = sincos(0.5 * (middle + half * node));
+            let density = self.profile.density(2.0 * self.r * s);
+            let (sin, cos) = (2.0 * s * c, 1.0 - 2.0 * s * s);
             for (c, density) in density.into_iter().enumerate() {
                 let mass = half * weight * density;
                 self.one[c] += mass;
