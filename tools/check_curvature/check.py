@@ -113,8 +113,9 @@ def main():
             row.append(np.nanmedian(np.abs(got.mean(1) - mean)[convex]) / size)
         row = [row[0], row[2], row[1], row[3]]
         print(f"{path.stem:16} {len(vertices):9} {size:9.4f} " + " ".join(f"{x:9.3f}" for x in row))
-        # Laces of a boot are as thin as its triangles: there a third.
-        if row[1] > 0.35:
+        # Twice what was measured at first. Laces of a boot are as thin as its triangles: there a third and a half.
+        normals, fit = (0.5, 0.35) if path.stem == "boot" else (0.29, 0.15)
+        if not (max(row[0], row[2]) < normals and max(row[1], row[3]) < fit):
             apart.append(path.stem)
     if apart:
         sys.exit("curvature is not libigl's on " + ", ".join(apart))

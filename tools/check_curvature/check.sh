@@ -8,7 +8,7 @@ venv=$root/.tools/curvature
 if [ ! -x "$venv/bin/python" ]; then
     mkdir -p "$root/.tools"
     python3 -m venv "$venv"
-    "$venv/bin/pip" install --quiet --disable-pip-version-check --only-binary :all: numpy libigl pymeshlab
+    "$venv/bin/pip" install --quiet --disable-pip-version-check --only-binary :all: numpy libigl==2.6.3 pymeshlab==2025.7.post1
 fi
 kinran=$1
 shift
