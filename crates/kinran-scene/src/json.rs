@@ -169,6 +169,8 @@ pub(crate) struct Attributes {
 pub(crate) struct MeshCurvature {
     #[serde(default = "half")]
     pub(crate) range: f32,
+    #[serde(default = "thousand")]
+    pub(crate) millimetres: f32,
 }
 
 /// `KINRAN_materials_skin`.
@@ -482,6 +484,10 @@ fn one3_f64() -> [f64; 3] {
 
 fn half() -> f32 {
     0.5
+}
+
+fn thousand() -> f32 {
+    1000.0
 }
 
 fn identity_quaternion() -> [f64; 4] {

@@ -13,6 +13,7 @@ mod frame;
 mod fuzz;
 mod json;
 mod load;
+mod obj;
 mod scene;
 mod studio;
 mod tangent;
@@ -25,3 +26,4 @@ pub use scene::{
     AlphaMode, Anisotropy, Camera, DiffuseTransmission, Instance, Light, LightKind, Material, Primitive,
     Scene, Skin, SkinProfile, Source, TextureRef, VertexCurvature, Wrap,
 };
+pub use tangent::arbitrary as any_tangent;

@@ -11,6 +11,7 @@ use serde::Deserialize;
 
 use crate::accessor::Accessors;
 use crate::container::{Resolver, beside, fetch, read_regular_file, split};
+use crate::obj::glb_from_obj;
 use crate::{
     AlphaMode, Anisotropy, Camera, DiffuseTransmission, Error, FUZZ_EXTENSION, Fuzz, FuzzAttenuation,
     FuzzLayer, FuzzPhase, Instance, Light, LightKind, Material, Primitive, Scene, Skin, SkinProfile, Source,
@@ -70,7 +71,8 @@ const TEXELS_MAX: u64 = 1 << 30;
 const INSTANCES_MAX: usize = 1 << 24;
 
 impl Scene {
-    /// Reads a `.gltf` (with its buffers and images beside it, or in `data:` URIs) or a `.glb`.
+    /// Reads a `.gltf` (with its buffers and images beside it, or in `data:` URIs) or a `.glb`; of an `.obj` the mesh, one
+    /// unit of which is taken for a metre.
     ///
     /// The document's default scene is taken, in its rest pose, with the default material variant. Points
     /// and lines are left out. Missing normals become flat ones and missing tangents MikkTSpace ones of
@@ -83,7 +85,10 @@ impl Scene {
     /// implemented. Memory stays in proportion to the files' sizes.
     pub fn load(path: impl AsRef<Path>) -> Result<Scene, Error> {
         let path = path.as_ref();
-        let bytes = read_regular_file(path).map_err(|error| Error::io(path, error))?;
+        let mut bytes = read_regular_file(path).map_err(|error| Error::io(path, error))?;
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
+            bytes = glb_from_obj(path, &bytes)?;
+        }
         Scene::from_bytes(path, &bytes, &beside(path))
     }
 
@@ -659,11 +664,13 @@ impl Loader<'_> {
     ) -> Result<VertexCurvature, Error> {
         let extension: Option<json::MeshCurvature> =
             self.extension(&primitive.extensions, "KINRAN_mesh_curvature", what)?;
-        let range = extension.map_or(0.5, |extension| extension.range);
-        if !(range > 0.0 && range.is_finite()) {
-            return Err(
-                self.error(format!("{what}: KINRAN_mesh_curvature: range is {range}; it must be above zero"))
-            );
+        let (range, millimetres) = extension.map_or((0.5, 1000.0), |e| (e.range, e.millimetres));
+        for (name, value) in [("range", range), ("millimetres", millimetres)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(self.error(format!(
+                    "{what}: KINRAN_mesh_curvature: {name} is {value}; it must be above zero"
+                )));
+            }
         }
         if let Some(at) = codes.iter().position(|code| code.iter().any(|x| !(0.0..=1.0).contains(x))) {
             return Err(self.error(format!(
@@ -676,7 +683,7 @@ impl Loader<'_> {
                 "{what} has _CURVATURE but no TANGENT, so its directions may be wrong; bake it anew"
             ));
         }
-        Ok(VertexCurvature { codes: codes.iter().copied().map(Vec4::from).collect(), range })
+        Ok(VertexCurvature { codes: codes.iter().copied().map(Vec4::from).collect(), range, millimetres })
     }
 
     /// The vertex indices of each triangle (glTF 2.0 section 3.7.2.1, primitive topologies).

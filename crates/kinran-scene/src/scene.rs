@@ -90,6 +90,8 @@ pub struct VertexCurvature {
     pub codes: Vec<Vec4>,
     /// Curvature of the code one, 1/mm.
     pub range: f32,
+    /// Millimetres in the mesh's unit of length, scale of its node included, as they were when it was baked.
+    pub millimetres: f32,
 }
 
 /// Where a primitive comes from.

@@ -62,9 +62,14 @@ pub(crate) fn generate(primitive: &mut Primitive, uv_set: usize) {
     primitive.triangles = welded.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
 }
 
-/// Any tangent perpendicular to a unit normal [2].
-pub(crate) fn arbitrary(normal: Vec3) -> Vec4 {
-    normal.any_orthonormal_vector().extend(1.0)
+/// A tangent perpendicular to a unit normal: the direction nearest to +y, so that those of neighbouring vertices nearly agree
+/// and what is interpolated in their frames, such as curvature, keeps its meaning. Where the normal is +y or -y there is
+/// none, and any will do [2].
+pub fn arbitrary(normal: Vec3) -> Vec4 {
+    let along = Vec3::Y - normal * normal.y;
+    let tangent =
+        if along.length_squared() > 1e-8 { along.normalize() } else { normal.any_orthonormal_vector() };
+    tangent.extend(1.0)
 }
 
 /// Replaces the vertices by the listed ones of the old; when the list is one of corners, the triangles

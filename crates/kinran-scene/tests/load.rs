@@ -506,3 +506,30 @@ fn numbers(value: &Value, pointer: String, out: &mut Vec<String>) {
         _ => {}
     }
 }
+
+#[test]
+fn an_obj_is_read_in_triangles_and_a_bad_one_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let load = |text: &str| {
+        let path = folder.path().join("a.obj");
+        std::fs::write(&path, text).unwrap();
+        Scene::load(&path).map_err(|e| e.to_string())
+    };
+    let corners = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    let scene = load(&format!("{corners}f 1/1 2/2 3/3 4/4\n")).unwrap();
+    let primitive = &scene.primitives[0];
+    assert_eq!(primitive.triangles.len(), 2, "a square is two triangles");
+    assert!(primitive.source.lacks_normals);
+    assert!(primitive.normals.iter().all(|n| (*n - Vec3::Z).length() < 1e-6));
+    let at = primitive.positions.iter().position(|p| p.x == 2.0 && p.y == 1.0).unwrap();
+    assert_eq!(primitive.uvs[0][at], Vec2::new(1.0, 0.0), "v runs down");
+    for (text, part) in [
+        (format!("{corners}f 1 2 1000000000\n"), "a.obj: a face names a v that is not there"),
+        (corners.to_owned(), "a.obj: the OBJ has no faces"),
+        ("v 0 0\nf 1 1 1\n".to_owned(), "a.obj: a v line"),
+        (format!("{}f 1 2 3\n", corners.replace("v 2 1 0", "v nan 1 0")), "POSITION"),
+    ] {
+        let error = load(&text).unwrap_err();
+        assert!(error.contains(part), "{text}: {error}");
+    }
+}

@@ -1,6 +1,6 @@
 //! `kinran bake`: engine-ready textures from a folder of maps or a glTF file.
 
-mod curvature;
+pub(crate) mod curvature;
 mod folder;
 mod gltf;
 mod library;

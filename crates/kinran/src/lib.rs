@@ -22,6 +22,7 @@ pub mod render;
 pub mod shaders;
 pub mod skin;
 pub mod skin_lut;
+pub mod skin_sheet;
 pub mod surfaces;
 mod table;
 mod values;

@@ -7,6 +7,7 @@ use clap::{Parser, Subcommand};
 use kinran::viewer;
 use kinran::{
     Console, Error, bake, cache, compare, demo, detail, fit, fuzz_sheet, inspect, render, shaders, skin_lut,
+    skin_sheet,
 };
 
 /// Anisotropic materials from authored maps to pictures.
@@ -53,6 +54,7 @@ enum Command {
     Fit(fit::Args),
     Fuzz(Box<fuzz_sheet::Args>),
     Shaders(shaders::Args),
+    Skin(Box<skin_sheet::Args>),
     SkinLut(skin_lut::Args),
     #[cfg(feature = "view")]
     View(Box<viewer::Args>),
@@ -84,6 +86,7 @@ fn run(command: &Command, console: &Console) -> Result<(), Error> {
         #[cfg(feature = "view")]
         Command::View(args) => viewer::run(args, console),
         Command::Shaders(args) => shaders::run(args, console),
+        Command::Skin(args) => skin_sheet::run(args, console),
         Command::SkinLut(args) => skin_lut::run(args, console),
     }
 }

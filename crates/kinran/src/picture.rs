@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
+use glam::{Vec2, vec2};
 
 use crate::Error;
 use crate::render::write_rgb8;
@@ -42,6 +43,17 @@ impl Picture {
         }
     }
 
+    /// A rectangle of it, smaller where it reaches over the edge.
+    pub fn part(&self, left: u32, top: u32, width: u32, height: u32) -> Picture {
+        let (width, height) =
+            (width.min(self.width.saturating_sub(left)), height.min(self.height.saturating_sub(top)));
+        let row = |y: u32| {
+            let start = (top + y) as usize * self.width as usize + left as usize;
+            &self.pixels[start..start + width as usize]
+        };
+        Picture { width, height, pixels: (0..height).flat_map(|y| row(y).iter().copied()).collect() }
+    }
+
     /// Writes one line of text of height `size` in pixels, its baseline beginning at (`x`, `y`); returns the
     /// column where it ends.
     pub fn text(&mut self, (x, y): (u32, u32), size: f32, color: Color, text: &str) -> u32 {
@@ -64,6 +76,24 @@ impl Picture {
             });
         }
         pen.ceil() as u32
+    }
+
+    /// A line of two pixels' width, its ends round; what lies outside is cut off.
+    pub fn line(&mut self, a: Vec2, b: Vec2, color: Color) {
+        let (low, high) = (a.min(b) - 2.0, a.max(b) + 2.0);
+        let columns = (low.x.max(0.0) as u32)..(high.x.max(0.0).min(self.width as f32) as u32);
+        for y in (low.y.max(0.0) as u32)..(high.y.max(0.0).min(self.height as f32) as u32) {
+            for x in columns.clone() {
+                let p = vec2(x as f32 + 0.5, y as f32 + 0.5);
+                let along = ((p - a).dot(b - a) / (b - a).length_squared().max(1e-6)).clamp(0.0, 1.0);
+                let coverage = (1.5 - p.distance(a + along * (b - a))).clamp(0.0, 1.0);
+                let pixel = &mut self.pixels[y as usize * self.width as usize + x as usize];
+                for (channel, ink) in pixel.iter_mut().zip(color) {
+                    let (paper, ink) = (f32::from(*channel), f32::from(ink));
+                    *channel = (paper + (ink - paper) * coverage + 0.5) as u8;
+                }
+            }
+        }
     }
 
     /// Scaled to `width` by `height` without interpolation, so that each pixel can be seen.
@@ -97,6 +127,16 @@ mod tests {
         assert_eq!(lit, [10, 11]);
         paper.text((1, 200), 20.0, [255; 3], "below");
         paper.text((300, 2), 20.0, [255; 3], "right");
+    }
+
+    #[test]
+    fn a_line_covers_what_lies_within_its_width() {
+        let mut paper = Picture::new(20, 10, [0; 3]);
+        paper.line(vec2(3.0, 5.0), vec2(15.0, 5.0), [200; 3]);
+        let inked = |x: usize, y: usize| paper.pixels[y * 20 + x][0];
+        assert_eq!((inked(9, 4), inked(9, 5)), (200, 200));
+        assert_eq!((inked(9, 2), inked(9, 7), inked(0, 5), inked(18, 5)), (0, 0, 0, 0));
+        paper.line(vec2(-50.0, -9.0), vec2(400.0, 90.0), [9; 3]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! `kinran skin-lut`: the tables of pre-integrated skin.
 
-mod plot;
+pub(crate) mod plot;
 mod profile_file;
 
 use std::path::{Path, PathBuf};

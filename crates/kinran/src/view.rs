@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, ValueEnum};
 use glam::{Affine3A, Mat3, Vec3};
 use kinran_render::reference::{
-    Background, Film, RenderScene, Settings, SkinCurvature, SurfaceTextures, TextureFiltering, look_at,
-    render,
+    Background, Film, RenderScene, Settings, SurfaceTextures, TextureFiltering, look_at, render,
 };
 use kinran_render::tonemap::{Tonemap, to_srgb8};
 use kinran_scene::{Camera, Environment, Light, LightKind, Scene};
 
-use crate::skin::{SkinCurvatureName, attach_skin};
+use crate::skin::{SkinArgs, attach_skin};
 use crate::surfaces::fuzz_coefficients;
 use crate::values::{direction, number, size, vector};
 use crate::{Error, Progress};
@@ -80,9 +79,9 @@ pub struct ViewArgs {
     #[arg(long, value_enum, default_value_t = Curve::Aces)]
     pub tonemap: Curve,
 
-    /// Which curvature materials that are skin are lit with
-    #[arg(long, value_enum, default_value_t)]
-    pub skin_curvature: SkinCurvatureName,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub skin: SkinArgs,
 }
 
 /// Where light from all around comes from.
@@ -130,8 +129,8 @@ pub struct View {
     pub exposure: f32,
     /// Tone curve.
     pub tonemap: Tonemap,
-    /// Which curvature skin is lit with.
-    pub skin_curvature: SkinCurvature,
+    /// How skin is lit.
+    pub skin: SkinArgs,
 }
 
 /// Radiance behind models where no environment's file is given; chosen by eye.
@@ -213,7 +212,7 @@ impl View {
                 Curve::Agx => Tonemap::AgX,
                 Curve::None => Tonemap::None,
             },
-            skin_curvature: args.skin_curvature.into(),
+            skin: args.skin.clone(),
         };
         Ok(View { camera: view.camera_at(args.distance), ..view })
     }
@@ -246,7 +245,7 @@ impl View {
         let mut prepared = RenderScene::new(scene, surfaces, self.environment.clone())?;
         prepared.fit_fuzz(fuzz_coefficients);
         prepared.lights.clone_from(&self.lights);
-        attach_skin(scene, &mut prepared, self.skin_curvature)?;
+        attach_skin(scene, &mut prepared, &self.skin)?;
         Ok(prepared)
     }
 

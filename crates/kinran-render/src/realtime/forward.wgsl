@@ -3,12 +3,9 @@
 fn lit(surface: Surface, lobe: Lobe, skin: Skin) -> vec3f {
     var around = lobe;
     if skin.kind > 0u {
-        around.diffuse = vec3f(0.0);
+        around = skin_around(skin, surface, lobe);
     }
     var sum = surface.emitted + ambient(surface, around);
-    if skin.kind > 0u {
-        sum += skin_ambient(skin, surface, lobe.diffuse);
-    }
     for (var i = 0u; i < frame.counts.x; i++) {
         let light = frame.lights[i];
         let incoming = incident(light, surface.position);
@@ -20,15 +17,25 @@ fn lit(surface: Surface, lobe: Lobe, skin: Skin) -> vec3f {
         if skin.kind > 0u {
             // Where the mesh turns away, the table says how far light comes around it.
             let turned_away = dot(surface.geometric_normal, incoming.direction) <= 0.0;
-            var passed = 1.0;
+            var direct = select(1.0, 0.0, turned_away);
+            var scattered = vec3f(1.0);
             if light.color.w > 0.5 && !turned_away {
-                passed = shadow(surface.position, surface.geometric_normal, incoming.direction);
+                if material.skin_shadow.x > 0.0 {
+                    direct = skin_filtered_shadow(surface.position, surface.geometric_normal, incoming.direction);
+                    scattered = skin_in_penumbra(direct);
+                } else {
+                    direct = shadow(surface.position, surface.geometric_normal, incoming.direction);
+                    scattered = vec3f(direct);
+                }
             }
-            var reflected = lobe.diffuse / PI * skin_punctual(skin, incoming.direction, turned_away);
-            if u.z > 0.0 && !turned_away {
-                reflected += skin_gloss(surface, lobe, u) * u.z;
+            let cosine = skin_punctual(skin, incoming.direction, turned_away);
+            var gloss = vec3f(0.0);
+            if u.z > 0.0 && direct > 0.0 {
+                gloss = skin_gloss(surface, lobe, u) * u.z;
             }
-            sum += reflected * incoming.irradiance * passed;
+            let diffuse = lobe.diffuse / PI * scattered;
+            sum += fuzz_over_skin(surface.fuzz, incoming.direction, diffuse, cosine, gloss, direct)
+                * incoming.irradiance;
             continue;
         }
         if u.z <= 0.0 {

@@ -69,6 +69,27 @@ fn fuzz_over(fuzz: Fuzz, u: vec3f, base: vec3f, diffuse: vec3f) -> vec3f {
     return base * left + fuzz.color * (layer.lobe * n_u);
 }
 
+// The layer over skin, of which `diffuse * cosine` scatters and `gloss` does not; the share `direct` of the light is not in
+// shadow. Light that scatters came in where the surface faces it more: it was dimmed as light at the mean of `cosine` over
+// the channels is.
+fn fuzz_over_skin(fuzz: Fuzz, u: vec3f, diffuse: vec3f, cosine: vec3f, gloss: vec3f, direct: f32) -> vec3f {
+    let scattered = diffuse * cosine;
+    if fuzz.kind == FUZZ_NONE {
+        return scattered + gloss * direct;
+    }
+    if fuzz.kind == FUZZ_SIMPLE {
+        return scattered * (1.0 - fuzz.amount) + fuzz_over(fuzz, u, gloss, vec3f(0.0)) * direct;
+    }
+    let n_u = clamp((cosine.r + cosine.g + cosine.b) / 3.0, 1e-4, 1.0);
+    let penetrated = fuzz_passage(fuzz.amount, n_u);
+    let down = select(fuzz_p_s(fuzz.p_s, n_u, dot(fuzz.fibre, u)), 0.0, fuzz.attenuation == 1u);
+    var left = fuzz_attenuation(penetrated, fuzz.view.escaped, down, fuzz.color);
+    if fuzz.attenuation > 1u {
+        left = vec3f(fuzz_left(fuzz));
+    }
+    return scattered * left + fuzz_over(fuzz, u, gloss, vec3f(0.0)) * direct;
+}
+
 // What attenuation by the layer's albedo leaves, or by nothing.
 fn fuzz_left(fuzz: Fuzz) -> f32 {
     let gathered = fuzz_g(fuzz.amount, fuzz.view.n_v) * fuzz_ambient_factor(fuzz.ambient, fuzz.view.n_v, fuzz.view.t_v);

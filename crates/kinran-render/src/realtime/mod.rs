@@ -619,7 +619,7 @@ impl Layouts {
         material.push(uniform);
         material.extend([filtered; 3]);
         material.extend([smooth; 3]);
-        material.extend([filtered; 2]);
+        material.extend([filtered; 3]);
         Layouts {
             frame: layout(&[
                 uniform,

@@ -51,11 +51,42 @@ fn skin_punctual(skin: Skin, u: vec3f, turned_away: bool) -> vec3f {
     return vec3f(red.r, skin_read(n_u.y, curvature).g, skin_read(n_u.z, curvature).b);
 }
 
-// Diffuse light from all around, of a surface whose other ambient light is without it.
-fn skin_ambient(skin: Skin, surface: Surface, diffuse: vec3f) -> vec3f {
-    if frame.counts.y == 0u {
-        return vec3f(0.0);
+// The share of the shadowed light that reaches skin, filtered over a square across the light: the shadow map is asked along
+// lines from the point's tangent plane. What stands nearer than half the square's side casts no shadow, since hollows
+// rise above the plane. Frames shift the lines, so that their mean is a continuous square.
+fn skin_filtered_shadow(position: vec3f, normal: vec3f, direction: vec3f) -> f32 {
+    let width = material.skin_shadow.x;
+    let basis = m_n(select(direction, -direction, direction.z < 0.0));
+    let slope = 1.0 / max(dot(normal, direction), 0.1);
+    let m = frame.light_projection;
+    let across = basis[0] - direction * (dot(basis[0], normal) * slope);
+    let down = basis[1] - direction * (dot(basis[1], normal) * slope);
+    let middle = (m * vec4f(position + 0.5 * width * direction, 1.0)).xyz;
+    let x = (m * vec4f(width * across, 0.0)).xyz;
+    let y = (m * vec4f(width * down, 0.0)).xyz;
+    // Roberts's sequence.
+    let shift = fract(0.5 + f32(frame.counts.w) * vec2f(0.75487767, 0.56984029));
+    var lit = 0.0;
+    for (var i = 0; i < 6; i++) {
+        for (var j = 0; j < 6; j++) {
+            let place = (vec2f(f32(i), f32(j)) + shift) / 6.0 - 0.5;
+            let clip = middle + place.x * x + place.y * y;
+            let uv = clip.xy * vec2f(0.5, -0.5) + 0.5;
+            let seen = textureSampleCompareLevel(shadow_map, shadow_sampler, uv, clip.z);
+            lit += select(seen, 1.0, any(abs(clip.xy) > vec2f(1.0)));
+        }
     }
+    return lit / 36.0;
+}
+
+// What part of a light skin gets in a penumbra that a filtered shadow of `lit` places it in.
+fn skin_in_penumbra(lit: f32) -> vec3f {
+    let place = vec2f(lit, material.skin_shadow.y);
+    return textureSampleLevel(skin_penumbra_table, clamp_sampler, place, 0.0).rgb;
+}
+
+// Irradiance from all around.
+fn skin_irradiance_at(skin: Skin, normal: vec3f) -> vec3f {
     // The frame has irradiance; the library wants radiance.
     let lobe = array<f32, 9>(PI, PI / 1.5, PI / 1.5, PI / 1.5, PI / 4.0, PI / 4.0, PI / 4.0, PI / 4.0, PI / 4.0);
     var radiance: array<vec3f, 9>;
@@ -69,8 +100,22 @@ fn skin_ambient(skin: Skin, surface: Surface, diffuse: vec3f) -> vec3f {
         h_one = textureSampleLevel(skin_ambient_table, clamp_sampler, vec2f(at, 0.25), 0.0).rgb;
         h_two = textureSampleLevel(skin_ambient_table, clamp_sampler, vec2f(at, 0.75), 0.0).rgb;
     }
-    let irradiance = max(skin_irradiance(radiance, surface.normal, h_one, h_two), vec3f(0.0));
-    return surface.occlusion * diffuse / PI * irradiance;
+    return max(skin_irradiance(radiance, normal, h_one, h_two), vec3f(0.0));
+}
+
+// The lobe of skin for light from all around: a Lambert surface as much brighter as its harmonics are.
+fn skin_around(skin: Skin, surface: Surface, lobe: Lobe) -> Lobe {
+    var around = lobe;
+    if frame.counts.y == 0u {
+        return around;
+    }
+    var coefficients: array<vec3f, 9>;
+    for (var i = 0; i < 9; i++) {
+        coefficients[i] = frame.irradiance[i].rgb;
+    }
+    let plain = max(sh_evaluate(coefficients, surface.normal), vec3f(1e-6));
+    around.diffuse *= skin_irradiance_at(skin, surface.normal) / plain;
+    return around;
 }
 
 // The specular lobe with a second one, for `u` above the horizon.

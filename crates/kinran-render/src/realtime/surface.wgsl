@@ -22,6 +22,9 @@ struct Material {
     skin: vec4f,
     // xyz how far the normals of red, green and blue turn to the mesh's, w weight of the second lobe.
     skin_gloss: vec4f,
+    // x side of the square across the light that shadows are filtered over, in the world's unit, 0 for shadows as they
+    // are; y one over it, 1/mm.
+    skin_shadow: vec4f,
 }
 
 @group(1) @binding(0) var<uniform> material: Material;
@@ -43,6 +46,7 @@ struct Material {
 @group(1) @binding(16) var translucent_color_sampler: sampler;
 @group(1) @binding(24) var skin_table: texture_2d<f32>;
 @group(1) @binding(25) var skin_ambient_table: texture_2d<f32>;
+@group(1) @binding(26) var skin_penumbra_table: texture_2d<f32>;
 
 struct Vertex {
     @location(0) position: vec3f,

@@ -350,7 +350,7 @@ fn material_floats(m: &RenderMaterial, adjustment: Adjustment, curvature_range: 
         floats.extend([x_axis.y, y_axis.y, z_axis.y, 0.0]);
     }
     let Some(skin) = &m.skin else {
-        floats.extend([0.0; 8]);
+        floats.extend([0.0; 12]);
         return floats;
     };
     let kind = match skin.curvature {
@@ -361,6 +361,8 @@ fn material_floats(m: &RenderMaterial, adjustment: Adjustment, curvature_range: 
     };
     floats.extend([kind, skin.tables.range.recip(), curvature_range, skin.second_alpha]);
     floats.extend(skin.normal_blur.extend(skin.second_share).to_array());
+    let narrow = if skin.penumbra > 0.0 { skin.penumbra.recip() } else { 0.0 };
+    floats.extend([skin.penumbra / skin.millimetres, narrow, 0.0, 0.0]);
     floats
 }
 
@@ -399,10 +401,11 @@ fn material(
     for resource in resources {
         entries.push(wgpu::BindGroupEntry { binding: entries.len() as u32, resource });
     }
-    let tables = m.skin.as_ref().map(|skin| [&skin.tables.punctual, &skin.tables.ambient]);
+    let tables = m.skin.as_ref().map(|skin| &skin.tables);
+    let tables = tables.map(|t| [&t.punctual, &t.ambient, &t.penumbra]);
     let tables: Vec<_> = match tables {
         Some(tables) => tables.map(|table| skin_table(textures.gpu, table)).into(),
-        None => vec![views[0].clone(); 2],
+        None => vec![views[0].clone(); 3],
     };
     for table in &tables {
         let resource = wgpu::BindingResource::TextureView(table);

@@ -166,13 +166,13 @@ impl FuzzAt {
     #[inline]
     pub(crate) fn over(&self, u: Vec3, base: Vec3) -> Vec3 {
         let n_u = self.n.dot(u);
-        let (phase, attenuation, p_s, albedo) = match self.kind {
+        let phase = match self.kind {
             Kind::Simple { fuzziness, diffuse } => {
                 let soft = self.color * fuzz_deferred(u.z, self.view.n_v, u.dot(self.v), self.view.escaped);
                 let lambert = diffuse * (std::f32::consts::FRAC_1_PI * u.z.max(0.0));
                 return base + fuzziness * (soft - lambert);
             }
-            Kind::Layer { phase, attenuation, p_s, albedo } => (phase, attenuation, p_s, albedo),
+            Kind::Layer { phase, .. } => phase,
         };
         if n_u <= 1e-4 {
             return Vec3::ZERO;
@@ -189,7 +189,15 @@ impl FuzzAt {
                 (fuzz_layer(p, penetrated * self.view.escaped, n_u, self.view.n_v), penetrated)
             }
         };
-        let left = match attenuation {
+        base * self.left(penetrated, n_u, t_u) + self.color * (lobe * n_u)
+    }
+
+    /// What a layer leaves of the base for light that comes in at these cosines with normal and fibre, of which the share
+    /// `penetrated` reaches the base.
+    #[inline]
+    fn left(&self, penetrated: f32, n_u: f32, t_u: f32) -> Vec3 {
+        let Kind::Layer { phase, attenuation, p_s, albedo } = self.kind else { return Vec3::ONE };
+        match attenuation {
             FuzzAttenuation::None => Vec3::ONE,
             FuzzAttenuation::Albedo => Vec3::splat(1.0 - albedo),
             FuzzAttenuation::Unscattered => fuzz_attenuation(penetrated, self.view.escaped, 0.0, self.color),
@@ -200,8 +208,21 @@ impl FuzzAt {
                 };
                 fuzz_attenuation(penetrated, self.view.escaped, downward, self.color)
             }
-        };
-        base * left + self.color * (lobe * n_u)
+        }
+    }
+
+    /// The layer over skin, of which `diffuse * cosine` scatters and `gloss` does not; the share `direct` of the light is not in
+    /// shadow. Light that scatters came in where the surface faces it more: it was dimmed as light at the mean of
+    /// `cosine` over the channels is, so that the terminator keeps its colour.
+    pub(crate) fn over_skin(&self, u: Vec3, diffuse: Vec3, cosine: Vec3, gloss: Vec3, direct: Vec3) -> Vec3 {
+        let scattered = diffuse * cosine;
+        if let Kind::Simple { fuzziness, .. } = self.kind {
+            let soft = self.color * fuzz_deferred(u.z, self.view.n_v, u.dot(self.v), self.view.escaped);
+            return scattered * (1.0 - fuzziness) + (gloss + fuzziness * soft) * direct;
+        }
+        let n_u = (cosine.element_sum() / 3.0).clamp(1e-4, 1.0);
+        let left = self.left(fuzz_passage(self.density, n_u), n_u, self.t.dot(u));
+        scattered * left + self.over(u, gloss) * direct
     }
 
     /// Direction and roughness of the fibres, for sampling.

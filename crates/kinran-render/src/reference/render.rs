@@ -5,16 +5,17 @@ use super::{
     camera::CameraRay,
     fuzz::FuzzAt,
     geometry::SurfacePoint,
-    light::incident,
+    light::{Incident, incident},
     sampler::{pixel_seed, sample_2d},
     scene::{RenderMaterial, Surroundings},
     shading::{Shading, shadow_transmittance},
+    skin::{RenderSkin, SkinPoint},
 };
 use crate::Error;
 use glam::{Vec2, Vec3};
 use kinran_scene::{AlphaMode, Camera};
 use kinran_shading::fuzz::{fuzz_over_base_pdf, fuzz_over_base_sample};
-use kinran_shading::{ggx_vndf_pdf, ggx_vndf_sample};
+use kinran_shading::{ggx_vndf_pdf, ggx_vndf_sample, m_n};
 use rayon::prelude::*;
 use std::f32::consts::{FRAC_1_PI, TAU};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -105,6 +106,7 @@ const PIXEL: u32 = 0;
 const LOBE: u32 = 1;
 const ENVIRONMENT: u32 = 2;
 const BACKDROP: u32 = 3;
+const PENUMBRA: u32 = 4;
 
 /// Renders `scene`. `progress` is called with the number of tiles done and of all, from any thread. The same
 /// arguments give the same picture, bit by bit, whatever the number of threads.
@@ -277,16 +279,18 @@ impl Renderer<'_> {
         for light in &self.scene.lights {
             let Some(light) = incident(light, point.position) else { continue };
             if let (Some(at), Some(skin)) = (shading.skin, &self.scene.materials[point.material].skin) {
+                let cosine = skin.punctual(&at, light.direction);
+                let (direct, scattered) = if at.turns_away(light.direction) {
+                    (Vec3::ZERO, Vec3::ONE)
+                } else if self.settings.shadows && skin.penumbra > 0.0 {
+                    let lit = self.filtered_visibility(point, hit, view, &light, (&at, skin), sample);
+                    (lit, skin.in_penumbra(lit))
+                } else {
+                    let lit = self.visibility(point, hit, view, light.direction, light.distance);
+                    (lit, lit)
+                };
                 let u = to_shading * light.direction;
-                let scattered = shading.diffuse * FRAC_1_PI * skin.punctual(&at, light.direction);
-                if at.turns_away(light.direction) {
-                    sum += scattered * light.irradiance;
-                    continue;
-                }
-                let reflected = (scattered + shading.specular(u) * u.z.max(0.0)) * light.irradiance;
-                if reflected.max_element() > 0.0 {
-                    sum += reflected * self.visibility(point, hit, view, light.direction, light.distance);
-                }
+                sum += shading.of_skin(u, cosine, direct, scattered) * light.irradiance;
                 continue;
             }
             let u = to_shading * light.direction;
@@ -298,10 +302,6 @@ impl Renderer<'_> {
             }
         }
         if let Some(surroundings) = &self.scene.surroundings {
-            if let Some(fuzz) = &shading.fuzz {
-                return sum
-                    + shading.occlusion * self.environment_through(shading, fuzz, surroundings, sample);
-            }
             let n = shading.frame.z_axis;
             let irradiance = match (shading.skin, &self.scene.materials[point.material].skin) {
                 (Some(at), Some(skin)) => {
@@ -310,6 +310,14 @@ impl Renderer<'_> {
                 }
                 _ => surroundings.irradiance(n),
             };
+            if let Some(fuzz) = &shading.fuzz {
+                // Skin under fibres is a Lambert surface as much brighter as its harmonics are.
+                let mut base = *shading;
+                if shading.skin.is_some() {
+                    base.diffuse *= irradiance / surroundings.irradiance(n).max(Vec3::splat(1e-6));
+                }
+                return sum + shading.occlusion * self.environment_through(&base, fuzz, surroundings, sample);
+            }
             let mut diffuse = shading.diffuse * FRAC_1_PI * irradiance;
             if shading.translucent != Vec3::ZERO {
                 diffuse += shading.translucent * FRAC_1_PI * surroundings.irradiance(-n);
@@ -395,9 +403,43 @@ impl Renderer<'_> {
         if !self.settings.shadows {
             return Vec3::ONE;
         }
-        let geometry = &self.scene.geometry;
         let facing = if point.geometric_normal.dot(side) < 0.0 { -1.0 } else { 1.0 };
-        let origin = geometry.shadow_origin(hit, facing * point.geometric_normal);
+        let origin = self.scene.geometry.shadow_origin(hit, facing * point.geometric_normal);
+        self.passed(origin, direction, distance)
+    }
+
+    /// The share of a light that reaches skin, filtered over a square across the light, as a shadow map's filter does it: rays
+    /// along the light from the point's tangent plane. What stands nearer than half the square's side casts no shadow,
+    /// since hollows rise above the plane.
+    fn filtered_visibility(
+        &self,
+        point: &SurfacePoint,
+        hit: &Hit,
+        side: Vec3,
+        light: &Incident,
+        (at, skin): (&SkinPoint, &RenderSkin),
+        sample: Sample,
+    ) -> Vec3 {
+        // Chosen by eye: penumbras are smooth at eight samples a pixel.
+        const RAYS: u32 = 16;
+        let facing = if point.geometric_normal.dot(side) < 0.0 { -1.0 } else { 1.0 };
+        let origin = self.scene.geometry.shadow_origin(hit, facing * point.geometric_normal);
+        let (u, width) = (light.direction, skin.penumbra_width());
+        let across = m_n(if u.z < 0.0 { -u } else { u });
+        let sum: Vec3 = (sample.index * RAYS..(sample.index + 1) * RAYS)
+            .map(|i| {
+                let place = (sample_2d(i, PENUMBRA, sample.seed) - 0.5) * width;
+                let offset = place.x * across.x_axis + place.y * across.y_axis;
+                let forward = 0.5 * width + at.rise(u, offset);
+                self.passed(origin + offset + forward * u, u, (light.distance - forward).max(0.0))
+            })
+            .sum();
+        sum / RAYS as f32
+    }
+
+    /// The share of light that passes from `origin` up to a distance.
+    fn passed(&self, origin: Vec3, direction: Vec3, distance: f32) -> Vec3 {
+        let geometry = &self.scene.geometry;
         if !self.cutouts {
             return Vec3::splat(f32::from(u8::from(
                 !geometry.bvh().any_hit(origin, direction, 0.0, distance),

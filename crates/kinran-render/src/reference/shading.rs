@@ -229,6 +229,17 @@ impl Shading {
         self.fuzz.as_ref().map_or(base, |fuzz| fuzz.over(u, base))
     }
 
+    /// What skin reflects of a light along `u`, BRDF times cosine, through the fuzz if there is any: `cosine` is what scatters,
+    /// times π, `direct` the share of the light that is not in shadow, `scattered` of it what scatters into shadows.
+    pub(crate) fn of_skin(&self, u: Vec3, cosine: Vec3, direct: Vec3, scattered: Vec3) -> Vec3 {
+        let diffuse = self.diffuse * FRAC_1_PI * scattered;
+        let gloss = self.specular(u) * u.z.max(0.0);
+        match &self.fuzz {
+            None => diffuse * cosine + gloss * direct,
+            Some(fuzz) => fuzz.over_skin(u, diffuse, cosine, gloss, direct),
+        }
+    }
+
     /// How bright the specular and the diffuse lobe of the base are, roughly, for sampling.
     pub(crate) fn brightness(&self) -> (f32, f32) {
         let specular = specular_albedo(self.f0.max_element(), self.v.z, self.alpha_t, self.alpha_b);

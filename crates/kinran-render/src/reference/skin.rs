@@ -1,7 +1,7 @@
 //! Skin by pre-integration: the tables, and a point that is lit with them.
 
 use super::geometry::SurfacePoint;
-use glam::{Mat3, Vec2, Vec3, vec2};
+use glam::{Mat3, Vec2, Vec3, vec2, vec3};
 use kinran_shading::Sym2;
 use kinran_shading::skin::curvature::{
     curvature_decode, curvature_from_light, curvature_from_light_normalized,
@@ -55,6 +55,8 @@ pub struct SkinTables {
     pub punctual: SkinTable,
     /// Of ambient light: mean curvature from 0 to `range` across, bands 1 and 2 down.
     pub ambient: SkinTable,
+    /// Of shadows' penumbras: the filtered shadow from 0 to 1 across, one over the penumbra's width from 0 to 1/mm down.
+    pub penumbra: SkinTable,
     /// Largest curvature, 1/mm.
     pub range: f32,
 }
@@ -68,6 +70,11 @@ pub struct RenderSkin {
     pub curvature: SkinCurvature,
     /// How far the diffuse normal of each channel turns towards the mesh's.
     pub normal_blur: Vec3,
+    /// Width across the light, in millimetres, over which shadows are filtered and in which light scatters; 0 for shadows as
+    /// they are.
+    pub penumbra: f32,
+    /// Millimetres in the world's unit of length.
+    pub millimetres: f32,
     /// GGX roughness of a second lobe of gloss.
     pub second_alpha: f32,
     /// Its weight, 0 to 1.
@@ -90,6 +97,12 @@ pub(crate) struct SkinPoint {
 }
 
 impl SkinPoint {
+    /// Where the line along `u`, `offset` beside the point, meets the point's tangent plane: so far along `u`. At a tenth of
+    /// a right angle's sine, chosen by eye, planes that are nearly seen edge-on stop running away.
+    pub(crate) fn rise(&self, u: Vec3, offset: Vec3) -> f32 {
+        -offset.dot(self.mesh_normal) / self.mesh_normal.dot(u).max(0.1)
+    }
+
     /// Whether the mesh turns away from a light along `u`. The table says how far light comes around it then; a shadow
     /// ray would only meet the mesh itself.
     pub(crate) fn turns_away(&self, u: Vec3) -> bool {
@@ -133,6 +146,18 @@ impl RenderSkin {
             return read(at.normals[0]);
         }
         Vec3::from_array([0, 1, 2].map(|c| read(at.normals[c])[c]))
+    }
+
+    /// Side of the square across a light, in the world's unit, over which shadows are filtered.
+    pub(crate) fn penumbra_width(&self) -> f32 {
+        self.penumbra / self.millimetres
+    }
+
+    /// What part of a light skin gets in a penumbra that a filtered shadow of `lit` places it in.
+    pub(crate) fn in_penumbra(&self, lit: Vec3) -> Vec3 {
+        let row = self.penumbra.recip();
+        let read = |c: usize| self.tables.penumbra.sample(vec2(lit[c], row))[c];
+        vec3(read(0), read(1), read(2))
     }
 
     /// What the profile leaves of bands 1 and 2 of ambient light.

@@ -87,9 +87,9 @@ pub enum DumpFormat {
 
 /// Deviations in millimetres.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Blur(Vec<f64>);
+pub struct Blur(pub(crate) Vec<f64>);
 
-fn deviations(text: &str) -> Result<Blur, String> {
+pub(crate) fn deviations(text: &str) -> Result<Blur, String> {
     if text == "none" {
         return Ok(Blur(Vec::new()));
     }
@@ -97,6 +97,15 @@ fn deviations(text: &str) -> Result<Blur, String> {
     match numbers {
         Ok(v) if v.len() <= 4 && v.iter().all(|x| *x > 0.0 && *x <= 1e6) => Ok(Blur(v)),
         _ => Err("write one to four positive numbers, such as 8,2.3, or none".into()),
+    }
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Normals => Method::Normals,
+            MethodName::Fit => Method::Fit,
+        }
     }
 }
 
@@ -235,6 +244,12 @@ pub(super) fn bake(
     let mut reports = Vec::new();
     let groups: Vec<Vec<usize>> =
         meshes(scene).into_iter().filter(|mesh| mesh.iter().any(|&i| wanted(&scene.primitives[i]))).collect();
+    if groups.is_empty() && (!flags.skin.is_empty() || flags.curvature == Which::All) {
+        return Err(Error::Usage(format!(
+            "{}: no mesh to measure curvature of has triangles; export the mesh with its faces",
+            args.input.display()
+        )));
+    }
     let stage = console.progress().stage("curvature", groups.len() as u64);
     for mesh in groups {
         let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
@@ -250,10 +265,7 @@ pub(super) fn bake(
         let surface = Joined::new(&group);
         let millimetres = flags.unit_mm.map_or_else(|| unit(scene, &mesh, &name, warnings), f64::from);
         let options = Options {
-            method: match flags.curvature_method {
-                MethodName::Normals => Method::Normals,
-                MethodName::Fit => Method::Fit,
-            },
+            method: flags.curvature_method.into(),
             millimetres,
             blur: flags.curvature_blur.as_ref().map_or_else(|| BLUR.to_vec(), |blur| blur.0.clone()),
             clamp: true,
@@ -271,7 +283,7 @@ pub(super) fn bake(
         let packed = baked.pack(flags.curvature_range.unwrap_or_else(|| baked.fitting_range()));
         for (primitive, &first) in group.iter().zip(&surface.firsts) {
             if wanted(primitive) {
-                put(document, primitive, first, &packed)?;
+                put(document, primitive, first, &packed, millimetres)?;
             }
         }
         document.use_extension("KINRAN_mesh_curvature", false);
@@ -293,7 +305,7 @@ pub(super) fn bake(
 }
 
 /// The scene's primitives of each mesh, in the document's order.
-fn meshes(scene: &Scene) -> Vec<Vec<usize>> {
+pub(crate) fn meshes(scene: &Scene) -> Vec<Vec<usize>> {
     let mut meshes: Vec<Vec<usize>> = Vec::new();
     for (i, primitive) in scene.primitives.iter().enumerate() {
         match meshes.last_mut() {
@@ -305,17 +317,17 @@ fn meshes(scene: &Scene) -> Vec<Vec<usize>> {
 }
 
 /// Primitives as one surface.
-struct Joined {
-    positions: Vec<Vec3>,
-    normals: Vec<Vec3>,
-    tangents: Vec<Vec4>,
-    triangles: Vec<[u32; 3]>,
+pub(crate) struct Joined {
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) normals: Vec<Vec3>,
+    pub(crate) tangents: Vec<Vec4>,
+    pub(crate) triangles: Vec<[u32; 3]>,
     /// Each primitive's first vertex.
-    firsts: Vec<usize>,
+    pub(crate) firsts: Vec<usize>,
 }
 
 impl Joined {
-    fn new(group: &[&Primitive]) -> Self {
+    pub(crate) fn new(group: &[&Primitive]) -> Self {
         let mut joined = Joined {
             positions: Vec::new(),
             normals: Vec::new(),
@@ -336,7 +348,7 @@ impl Joined {
 }
 
 /// Millimetres in a mesh's unit: a metre times the scale of where it stands.
-fn unit(scene: &Scene, mesh: &[usize], name: &str, warnings: &mut Vec<String>) -> f64 {
+pub(crate) fn unit(scene: &Scene, mesh: &[usize], name: &str, warnings: &mut Vec<String>) -> f64 {
     let placed = scene.instances.iter().filter(|i| mesh.contains(&i.primitive));
     let scales: Vec<(f64, bool)> = placed
         .map(|i| {
@@ -377,7 +389,13 @@ fn vertex_count(document: &Document, mesh: usize, primitive: usize) -> usize {
 
 /// Writes tangents, if they were missing, and codes into the document's primitive. Where tangents split vertices, the
 /// primitive gets new ones.
-fn put(document: &mut Document, primitive: &Primitive, first: usize, packed: &Packed) -> Result<(), Error> {
+fn put(
+    document: &mut Document,
+    primitive: &Primitive,
+    first: usize,
+    packed: &Packed,
+    millimetres: f64,
+) -> Result<(), Error> {
     let source = &primitive.source;
     let (mesh, number) = (source.mesh, source.primitive);
     let codes = &packed.bytes[first..first + primitive.positions.len()];
@@ -405,7 +423,8 @@ fn put(document: &mut Document, primitive: &Primitive, first: usize, packed: &Pa
     document.set_attribute(mesh, number, "_CURVATURE", Attribute::Byte4(&bytes));
     let extensions = document.primitive_mut(mesh, number).entry("extensions").or_insert_with(|| json!({}));
     if let Some(extensions) = extensions.as_object_mut() {
-        extensions.insert("KINRAN_mesh_curvature".into(), json!({ "range": packed.range }));
+        let meaning = json!({ "range": packed.range, "millimetres": millimetres });
+        extensions.insert("KINRAN_mesh_curvature".into(), meaning);
     }
     Ok(())
 }

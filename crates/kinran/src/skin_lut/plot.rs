@@ -18,7 +18,7 @@ const MARGIN: u32 = 74;
 const TOP: u32 = 84;
 
 /// The punctual table as it looks, cuts through it at three curvatures, and the ambient factors.
-pub(super) fn plot(title: &str, punctual: &Table, ambient: &Table, range: f32) -> Picture {
+pub(crate) fn plot(title: &str, punctual: &Table, ambient: &Table, range: f32) -> Picture {
     let mut picture = Picture::new(3 * (SIDE + MARGIN) + MARGIN / 2, TOP + SIDE + 64, PAPER);
     picture.text((MARGIN, 32), 22.0, INK, title);
     let left = |panel: u32| MARGIN + panel * (SIDE + MARGIN);

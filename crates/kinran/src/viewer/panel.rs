@@ -198,6 +198,11 @@ pub(super) fn panel(ui: &mut Ui, p: &mut Parameters, selected: &mut usize, shown
             if ui.button("Normals by the profile").clicked() {
                 skin.normal_blur = SKIN_NORMAL_BLUR.to_array();
             }
+            ui.add(
+                Slider::new(&mut skin.penumbra, 0.0..=20.0)
+                    .text("penumbra, light scatters in it")
+                    .suffix(" mm"),
+            );
             ui.add(Slider::new(&mut skin.second_share, 0.0..=1.0).text("second lobe of gloss"));
             ui.add(Slider::new(&mut skin.second_roughness, 0.0..=1.0).text("its roughness"));
         }

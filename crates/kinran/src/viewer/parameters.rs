@@ -85,6 +85,9 @@ pub(super) struct SkinParameters {
     pub(super) curvature: usize,
     /// How far the diffuse normals of red, green and blue turn to the mesh's.
     pub(super) normal_blur: [f32; 3],
+    /// Millimetres over which shadows are filtered, and in which light scatters.
+    #[serde(default)]
+    pub(super) penumbra: f32,
     /// Weight of the second lobe of gloss.
     pub(super) second_share: f32,
     /// Its perceptual roughness.
@@ -96,6 +99,7 @@ impl SkinParameters {
         Self {
             curvature: CURVATURES.iter().position(|(_, c)| *c == skin.curvature).unwrap_or(0),
             normal_blur: skin.normal_blur.to_array(),
+            penumbra: skin.penumbra,
             second_share: skin.second_share,
             second_roughness: skin.second_alpha.sqrt(),
         }
@@ -104,6 +108,7 @@ impl SkinParameters {
     pub(super) fn apply(&self, skin: &mut RenderSkin) {
         skin.curvature = CURVATURES[self.curvature.min(CURVATURES.len() - 1)].1;
         skin.normal_blur = Vec3::from(self.normal_blur);
+        skin.penumbra = self.penumbra;
         skin.second_share = self.second_share;
         skin.second_alpha = (self.second_roughness * self.second_roughness).max(ALPHA_MIN);
     }

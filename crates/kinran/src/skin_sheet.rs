@@ -1,0 +1,550 @@
+//! `kinran skin`: a model as skin, choice by choice, as the talk compares them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use clap::ValueEnum;
+use glam::{Vec2, Vec3, Vec4, vec2, vec3};
+use kinran_bake::aniso::Filter;
+use kinran_bake::curvature::{BLUR, Mesh, Options, bake_curvature, estimated_normals, principal};
+use kinran_bake::skin_lut::{Profile, Table, punctual_table};
+use kinran_render::reference::{
+    PictureCamera, RenderScene, RenderSkin, SkinCurvature, SurfacePoint, TextureFiltering,
+};
+use kinran_scene::{Light, LightKind, Primitive, Scene, Skin, VertexCurvature, any_tangent};
+use kinran_shading::Sym2;
+use kinran_shading::skin::curvature::curvature_decode;
+use kinran_shading::skin::lighting::SKIN_NORMAL_BLUR;
+use kinran_shading::skin::profile::Gaussian;
+use serde::Serialize;
+
+use crate::bake::curvature::{Blur, Joined, MethodName, deviations, meshes, unit};
+use crate::picture::{Color, Picture};
+use crate::skin::{SIZE, profile, skin_table};
+use crate::skin_lut::plot::plot;
+use crate::surfaces::{Mips, scene_surfaces};
+use crate::values::{number, vector};
+use crate::view::{View, ViewArgs, file_name};
+use crate::{Console, Error, Progress, outputs};
+
+/// Draws a model as skin, a sheet of pictures for each choice
+///
+/// Sheets: turn (zero, mean and directional curvature under a light that goes round), curvature (in false colour, beside
+/// the picture and over the table of punctual light), profiles (the radial profile on the ring, which is wrong, beside the
+/// linear one, and four times their difference), shadows (hard, filtered, and with light scattering into penumbras),
+/// normals (of the map for all channels, blurred by channel, of the mesh), tensors (directions of the larger curvature as
+/// short lines).
+///
+/// Every material is taken for skin unless the file marks some. Curvature is that of the file, or baked in memory where it
+/// has none, of smooth normals where it has none of those either.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  kinran skin head.gltf -o head/ --unit-mm 50
+  kinran skin hand.obj -o hand/ --unit-mm 1000 --sheet turn,curvature
+  kinran skin goat.obj -o goat/ --sheet tensors --curvature-method fit --curvature-blur none")]
+pub struct Args {
+    /// The .glb, .gltf or .obj file
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+
+    /// The folder for the sheets
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+
+    /// Draws these sheets; all by default
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAMES")]
+    pub sheet: Vec<Sheet>,
+
+    /// Linear colour of the skin, in the place of the file's
+    #[arg(long, value_name = "R,G,B", value_parser = vector)]
+    pub base: Option<Vec3>,
+
+    /// Millimetres in a unit of the file's meshes; the default is a metre times the nodes' scale
+    #[arg(long, value_name = "MM", value_parser = |t: &str| number(t, 1e-6..=1e9))]
+    pub unit_mm: Option<f32>,
+
+    /// Shows this part of every picture: left, top, width and height, of 0 to 1
+    #[arg(long, value_name = "X,Y,W,H", value_parser = part)]
+    pub crop: Option<[f32; 4]>,
+
+    /// How tensors are found
+    #[arg(long, value_enum, default_value_t)]
+    pub curvature_method: MethodName,
+
+    /// Deviations of the Gaussians that blur curvature, mm, or "none" [default: 8,2.3]
+    #[arg(long, value_name = "MM,MM", value_parser = deviations)]
+    pub curvature_blur: Option<Blur>,
+
+    /// Samples in a pixel
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub spp: u32,
+
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub view: ViewArgs,
+}
+
+fn part(text: &str) -> Result<[f32; 4], String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse::<f32>()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, w, h]) if x >= 0.0 && y >= 0.0 && w > 0.0 && h > 0.0 && x + w <= 1.0 && y + h <= 1.0 => {
+            Ok([x, y, w, h])
+        }
+        _ => Err("write left, top, width and height, such as 0.25,0,0.5,0.5".into()),
+    }
+}
+
+/// What a sheet shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[allow(missing_docs, reason = "the names say it")]
+pub enum Sheet {
+    Turn,
+    Curvature,
+    Profiles,
+    Shadows,
+    Normals,
+    Tensors,
+}
+
+/// Colours and lengths are chosen by eye.
+const PAPER: Color = [22, 23, 26];
+const INK: Color = [234, 234, 236];
+const GAP: u32 = 10;
+const LABEL: u32 = 26;
+
+/// Pixels between the tensors' lines.
+const SPACING: u32 = 9;
+
+#[derive(Serialize)]
+struct Summary {
+    files: Vec<String>,
+    warnings: Vec<String>,
+}
+
+/// The command.
+///
+/// # Errors
+/// One that names the flag or the file.
+pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    outputs::check_folder(&args.output)?;
+    if let Some(c) = args.base.filter(|c| c.min_element() < 0.0 || c.max_element() > 1.0) {
+        return Err(Error::Usage(format!("--base {},{},{}: each must lie in 0 to 1", c.x, c.y, c.z)));
+    }
+    let mut scene = Scene::load(&args.file)?;
+    let mut warnings = scene.warnings.clone();
+    if scene.materials.iter().all(|m| m.skin.is_none()) {
+        scene.materials.iter_mut().for_each(|m| m.skin = Some(Skin::default()));
+    }
+    let progress = console.progress();
+    bake(args, &mut scene, &progress, &mut warnings)?;
+
+    let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
+    let (surfaces, apart) = scene_surfaces(&scene, Mips::Filtered(Filter::Linear), &progress)?;
+    warnings.extend(apart);
+    warnings.iter().for_each(|w| console.warn(w));
+    let mut prepared = view.scene(&scene, surfaces)?;
+    if let Some(base) = args.base {
+        for material in &mut prepared.materials {
+            material.base_color_factor = base.extend(material.base_color_factor.w);
+            material.base_color = None;
+        }
+    }
+    let studio = Studio { args, scene: &scene, prepared, view, progress: &progress };
+
+    std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
+    let all = Sheet::value_variants();
+    let mut files = Vec::new();
+    for &sheet in if args.sheet.is_empty() { all } else { &args.sheet } {
+        let name = format!("{}.png", sheet.to_possible_value().expect("no sheet is hidden").get_name());
+        studio.sheet(sheet)?.write(&args.output.join(&name))?;
+        files.push(name);
+    }
+    let text =
+        format!("{} sheets of {} are in {}", files.len(), file_name(&args.file), args.output.display());
+    console.result(&Summary { files, warnings }, &text)
+}
+
+/// Gives meshes without curvature some, as `kinran bake` would write it.
+fn bake(
+    args: &Args,
+    scene: &mut Scene,
+    progress: &Progress,
+    warnings: &mut Vec<String>,
+) -> Result<(), Error> {
+    let groups = meshes(scene);
+    let stage = progress.stage("curvature", groups.len() as u64);
+    for group in groups {
+        stage.add(1);
+        if group.iter().all(|&i| scene.primitives[i].curvature.is_some()) {
+            continue;
+        }
+        let name = format!("mesh {}", scene.primitives[group[0]].source.mesh);
+        let of = |scene: &Scene| {
+            let primitives: Vec<&Primitive> = group.iter().map(|&i| &scene.primitives[i]).collect();
+            Joined::new(&primitives)
+        };
+        let mut surface = of(scene);
+        if group.iter().any(|&i| scene.primitives[i].source.lacks_normals) {
+            let normals = estimated_normals(&surface.positions, &surface.triangles);
+            for (&i, &first) in group.iter().zip(&surface.firsts) {
+                let primitive = &mut scene.primitives[i];
+                if !primitive.source.lacks_normals {
+                    continue;
+                }
+                for (vertex, normal) in primitive.normals.iter_mut().enumerate() {
+                    *normal = normals[first + vertex].normalize_or(*normal);
+                }
+                primitive.tangents = primitive.normals.iter().map(|&n| any_tangent(n)).collect();
+            }
+            warnings.push(format!("{name} has no normals; smooth ones were estimated"));
+            surface = of(scene);
+        }
+        let millimetres = args.unit_mm.map_or_else(|| unit(scene, &group, &name, warnings), f64::from);
+        let options = Options {
+            method: args.curvature_method.into(),
+            millimetres,
+            blur: args.curvature_blur.as_ref().map_or_else(|| BLUR.to_vec(), |blur| blur.0.clone()),
+            clamp: true,
+        };
+        let mesh = Mesh {
+            positions: &surface.positions,
+            normals: Some(&surface.normals),
+            tangents: Some(&surface.tangents),
+            triangles: &surface.triangles,
+        };
+        let baked = bake_curvature(&mesh, &options)
+            .map_err(|e| Error::Usage(format!("{}: {name}: {e}", args.file.display())))?;
+        let remarks = baked.report.remarks();
+        if !remarks.is_empty() {
+            warnings.push(format!("{name}: {remarks}"));
+        }
+        let packed = baked.pack(baked.fitting_range());
+        for (&i, &first) in group.iter().zip(&surface.firsts) {
+            let primitive = &mut scene.primitives[i];
+            let bytes = &packed.bytes[first..first + primitive.positions.len()];
+            let code = |bytes: &[u8; 4]| Vec4::from_array(bytes.map(|b| f32::from(b) / 255.0));
+            primitive.curvature = Some(VertexCurvature {
+                codes: bytes.iter().map(code).collect(),
+                range: packed.range,
+                millimetres: millimetres as f32,
+            });
+        }
+    }
+    Ok(())
+}
+
+struct Studio<'a> {
+    args: &'a Args,
+    scene: &'a Scene,
+    prepared: RenderScene,
+    view: View,
+    progress: &'a Progress,
+}
+
+impl Studio<'_> {
+    fn sheet(&self, sheet: Sheet) -> Result<Picture, Error> {
+        match sheet {
+            Sheet::Turn => self.turn(),
+            Sheet::Curvature => self.curvature(),
+            Sheet::Profiles => self.profiles(),
+            Sheet::Shadows => self.shadows(),
+            Sheet::Normals => self.normals(),
+            Sheet::Tensors => {
+                Ok(self.rows(&[vec![("directions of the larger curvature".into(), self.tensors())]]))
+            }
+        }
+    }
+
+    /// Zero, mean and directional curvature, each under a light from several sides.
+    fn turn(&self) -> Result<Picture, Error> {
+        let rows_of: Result<Vec<_>, Error> = [
+            ("zero", SkinCurvature::Zero),
+            ("mean", SkinCurvature::Mean),
+            ("directional", SkinCurvature::Directional),
+        ]
+        .into_iter()
+        .map(|(name, curvature)| {
+            [-105.0f32, -75.0, -35.0, 35.0, 75.0, 105.0]
+                .into_iter()
+                .map(|degrees| {
+                    let label = format!("{name}, light at {degrees}°");
+                    let picture = self.lit(&label, &self.around(degrees), |skin| skin.curvature = curvature);
+                    Ok((label, picture?))
+                })
+                .collect()
+        })
+        .collect();
+        Ok(self.rows(&rows_of?))
+    }
+
+    /// The picture, curvatures in false colour, and the table.
+    fn curvature(&self) -> Result<Picture, Error> {
+        let range = self.prepared.geometry.curvature_range();
+        // By the root: most of a body is gently curved.
+        let color = |k: f32| false_color((k / range).sqrt());
+        let row = vec![
+            ("directional".to_owned(), self.lit("picture", &self.side(), |_| {})?),
+            ("mean curvature".to_owned(), self.colored(|_, mean| color(mean))),
+            ("larger principal".to_owned(), self.colored(|t, _| color(principal(t).0))),
+            ("smaller principal".to_owned(), self.colored(|t, _| color(principal(t).1.max(0.0)))),
+        ];
+        let pictures = self.rows(&[row]);
+        let skin = self.skin()?;
+        let table = |t: &kinran_render::reference::SkinTable| Table {
+            width: t.width,
+            height: t.height,
+            entries: t.texels.iter().map(|t| t.to_array()).collect(),
+        };
+        let title = format!("{}: tables up to its largest curvature", file_name(&self.args.file));
+        let below =
+            plot(&title, &table(&skin.tables.punctual), &table(&skin.tables.ambient), skin.tables.range);
+
+        // A scale between both.
+        const SCALE: u32 = 46;
+        let width = pictures.width.max(below.width);
+        let mut sheet = Picture::new(width, pictures.height + SCALE + below.height, PAPER);
+        sheet.draw(0, 0, &pictures);
+        let (left, length) = (GAP + 190, 420);
+        sheet.text((GAP, pictures.height + 18), 15.0, INK, "curvature, 1/mm");
+        for x in 0..length {
+            let color = false_color(x as f32 / (length - 1) as f32);
+            sheet.draw(left + x, pictures.height + 6, &Picture::new(1, 14, color));
+        }
+        for i in 0..=4 {
+            let label = format!("{:.3}", range * (i as f32 / 4.0).powi(2));
+            sheet.text((left + i * (length - 1) / 4 - 16, pictures.height + 36), 13.0, INK, &label);
+        }
+        sheet.draw(0, pictures.height + SCALE, &below);
+        Ok(sheet)
+    }
+
+    /// The table from the radial profile as if it were linear, and from the linear one.
+    fn profiles(&self) -> Result<Picture, Error> {
+        self.skin()?;
+        let mut wrong = Vec::new();
+        for material in &self.scene.materials {
+            let Some(skin) = &material.skin else {
+                wrong.push(None);
+                continue;
+            };
+            let Profile::Gaussians(sum) = profile(skin) else {
+                return Err(Error::Usage(format!(
+                    "material \"{}\": Burley's radial profile diverges on a ring, so there is no wrong picture; leave \
+                     --sheet profiles out",
+                    material.name
+                )));
+            };
+            // A Gaussian per area over a line is one per length, its weight divided by the root of 2 π times the variance.
+            let divide = |g: &Gaussian| Gaussian { weight: g.weight.map(|w| w / g.variance.sqrt()), ..*g };
+            wrong.push(Some(Profile::Gaussians(sum.iter().map(divide).collect())));
+        }
+        let mut rows_of = Vec::new();
+        for degrees in [-80.0, 100.0] {
+            let light = self.around(degrees);
+            let mut swapped = self.prepared.clone();
+            for (material, wrong) in swapped.materials.iter_mut().zip(&wrong) {
+                let (Some(skin), Some(wrong)) = (&mut material.skin, wrong) else { continue };
+                let radial = wrong.radial().map_err(|e| Error::Internal(e.to_string()))?;
+                let mut tables = (*skin.tables).clone();
+                let range = f64::from(tables.range);
+                tables.punctual = skin_table(punctual_table(radial, SIZE.0, SIZE.1, range));
+                skin.tables = Arc::new(tables);
+            }
+            let wrong = self.draw("radial", &swapped, &light)?;
+            let right = self.draw("linear", &self.prepared, &light)?;
+            let apart = wrong.pixels.iter().zip(&right.pixels);
+            let apart =
+                apart.map(|(a, b)| [0, 1, 2].map(|c| a[c].abs_diff(b[c]).saturating_mul(4))).collect();
+            let apart = Picture { pixels: apart, ..wrong };
+            rows_of.push(vec![
+                ("radial profile on the ring (wrong)".to_owned(), wrong),
+                ("linear profile (right)".to_owned(), right),
+                ("four times the difference".to_owned(), apart),
+            ]);
+        }
+        Ok(self.rows(&rows_of))
+    }
+
+    /// Shadows as rays cast them, filtered, and with light that scatters into them.
+    fn shadows(&self) -> Result<Picture, Error> {
+        let skin = self.skin()?;
+        let width = if skin.penumbra > 0.0 { skin.penumbra } else { 8.0 };
+        let ramp: Vec<Vec3> = (0..64).map(|i| Vec3::splat((i as f32 + 0.5) / 64.0)).collect();
+        let ramp = kinran_render::reference::SkinTable { width: 64, height: 1, texels: ramp };
+        let plain = |skin: &mut RenderSkin| {
+            skin.penumbra = width;
+            skin.tables = Arc::new(kinran_render::reference::SkinTables {
+                penumbra: ramp.clone(),
+                ..(*skin.tables).clone()
+            });
+        };
+        let light = self.towards(vec3(-0.6, 0.9, 0.45));
+        Ok(self.rows(&[vec![
+            ("hard shadows".into(), self.lit("hard", &light, |skin| skin.penumbra = 0.0)?),
+            (format!("filtered over {width} mm"), self.lit("filtered", &light, plain)?),
+            ("light scatters in them".into(), self.lit("scattered", &light, |skin| skin.penumbra = width)?),
+        ]]))
+    }
+
+    /// Normals of the map, by channel, and of the mesh.
+    fn normals(&self) -> Result<Picture, Error> {
+        self.skin()?;
+        let light = self.side();
+        let shot = |name: &str, blur: Vec3| self.lit(name, &light, |skin| skin.normal_blur = blur);
+        Ok(self.rows(&[vec![
+            ("normals of the map".into(), shot("map", Vec3::ZERO)?),
+            ("blurred by channel".into(), shot("profile", SKIN_NORMAL_BLUR)?),
+            ("normals of the mesh".into(), shot("mesh", Vec3::ONE)?),
+        ]]))
+    }
+
+    /// Pictures under their labels, row by row, cut to what is shown of them.
+    fn rows(&self, rows: &[Vec<(String, Picture)>]) -> Picture {
+        let [x, y, w, h] = self.args.crop.unwrap_or([0.0, 0.0, 1.0, 1.0]);
+        let of = |share: f32, side: u32| (share * side as f32).round() as u32;
+        let (full_width, full_height) = self.view.size;
+        let (left, top) = (of(x, full_width), of(y, full_height));
+        let (width, height) = (of(w, full_width).max(1), of(h, full_height).max(1));
+        let columns = rows.iter().map(Vec::len).max().unwrap_or(0) as u32;
+        let mut sheet =
+            Picture::new(GAP + (width + GAP) * columns, (LABEL + height) * rows.len() as u32 + GAP, PAPER);
+        for (j, row) in rows.iter().enumerate() {
+            let below = (LABEL + height) * j as u32;
+            for (i, (name, picture)) in row.iter().enumerate() {
+                let beside = GAP + (width + GAP) * i as u32;
+                sheet.text((beside, below + 18), 15.0, INK, name);
+                sheet.draw(beside, below + LABEL, &picture.part(left, top, width, height));
+            }
+        }
+        sheet
+    }
+
+    /// Skin of the first material that is some.
+    fn skin(&self) -> Result<&RenderSkin, Error> {
+        let skin = self.prepared.materials.iter().find_map(|m| m.skin.as_ref());
+        skin.ok_or_else(|| Error::Usage(format!("{}: no material is skin", self.args.file.display())))
+    }
+
+    /// A light that stands so far round the camera's view, degrees to the right, a little above it.
+    fn around(&self, degrees: f32) -> Vec<Light> {
+        let a = degrees.to_radians();
+        self.towards(vec3(a.sin(), 0.25, a.cos()))
+    }
+
+    /// The first of the flags' lights, else one from the side.
+    fn side(&self) -> Vec<Light> {
+        if self.args.view.light.is_empty() { self.around(-80.0) } else { self.view.lights.clone() }
+    }
+
+    /// A light in the camera's frame: right, up, back.
+    fn towards(&self, direction: Vec3) -> Vec<Light> {
+        let to_light = self.view.camera.transform.transform_vector3(direction).normalize();
+        vec![Light {
+            kind: LightKind::Directional,
+            color: Vec3::splat(std::f32::consts::PI),
+            position: Vec3::ZERO,
+            direction: -to_light,
+            range: f32::INFINITY,
+        }]
+    }
+
+    /// A picture with skin changed.
+    fn lit(&self, name: &str, lights: &[Light], change: impl Fn(&mut RenderSkin)) -> Result<Picture, Error> {
+        let mut scene = self.prepared.clone();
+        scene.materials.iter_mut().filter_map(|m| m.skin.as_mut()).for_each(change);
+        self.draw(name, &scene, lights)
+    }
+
+    /// A picture in the light of `lights` alone.
+    fn draw(&self, name: &str, scene: &RenderScene, lights: &[Light]) -> Result<Picture, Error> {
+        let mut scene = scene.clone();
+        scene.lights = lights.to_vec();
+        scene.surroundings = None;
+        let filtering = TextureFiltering::Mips { max_anisotropy: 16 };
+        let film = self.view.render(&scene, name, self.args.spp, filtering, self.progress)?;
+        Ok(Picture { width: film.width, height: film.height, pixels: self.view.display(&film) })
+    }
+
+    /// What the camera sees at a point of the picture.
+    fn seen(&self, camera: &PictureCamera, at: Vec2) -> Option<(SurfacePoint, Vec3)> {
+        let ray = camera.ray(at.x, at.y);
+        let hit = self.prepared.geometry.bvh().closest_hit(ray.origin, ray.direction, 0.0, f32::INFINITY)?;
+        Some((self.prepared.geometry.surface_point(&hit, &ray), -ray.direction))
+    }
+
+    /// Tensor and mean curvature as display colours, four samples a pixel.
+    fn colored(&self, color: impl Fn(Sym2, f32) -> Color) -> Picture {
+        let (width, height) = self.view.size;
+        let camera = PictureCamera::new(&self.view.camera, width, height);
+        let range = self.prepared.geometry.curvature_range();
+        let mut picture = Picture::new(width, height, BACKDROP);
+        for (i, pixel) in picture.pixels.iter_mut().enumerate() {
+            let corner = vec2((i as u32 % width) as f32, (i as u32 / width) as f32);
+            let samples = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)].map(|(x, y)| {
+                match self.seen(&camera, corner + vec2(x, y)) {
+                    Some((point, _)) => {
+                        let (tensor, mean) = curvature_decode(point.curvature, range);
+                        color(tensor, mean)
+                    }
+                    None => BACKDROP,
+                }
+            });
+            let sum = |c: usize| samples.iter().map(|s| u32::from(s[c])).sum::<u32>();
+            *pixel = [0, 1, 2].map(|c| ((sum(c) + 2) / 4) as u8);
+        }
+        picture
+    }
+
+    /// The model in grey, and on it the direction of the larger principal curvature, in the colour of its size. Lines are short
+    /// where the smaller one is nearly as large.
+    fn tensors(&self) -> Picture {
+        let (width, height) = self.view.size;
+        let camera = PictureCamera::new(&self.view.camera, width, height);
+        let range = self.prepared.geometry.curvature_range();
+        let mut picture = Picture::new(width, height, BACKDROP);
+        for (i, pixel) in picture.pixels.iter_mut().enumerate() {
+            let at = vec2((i as u32 % width) as f32 + 0.5, (i as u32 / width) as f32 + 0.5);
+            if let Some((point, view)) = self.seen(&camera, at) {
+                let facing = point.tangent_frame.z_axis.normalize_or_zero().dot(view).max(0.0);
+                *pixel = [(38.0 + 60.0 * facing) as u8; 3];
+            }
+        }
+        let to_camera = self.view.camera.transform.inverse();
+        let focal = 0.5 * height as f32 / (0.5 * self.view.camera.yfov).tan();
+        let project = |p: Vec3| {
+            let p = to_camera.transform_point3(p);
+            vec2(0.5 * width as f32 + focal * p.x / -p.z, 0.5 * height as f32 - focal * p.y / -p.z)
+        };
+        for y in (SPACING / 2..height).step_by(SPACING as usize) {
+            // Every other row is shifted, so that lines stand in no columns.
+            let shift = if (y / SPACING).is_multiple_of(2) { SPACING / 4 } else { 3 * SPACING / 4 };
+            for x in (shift..width).step_by(SPACING as usize) {
+                let Some((point, view)) = self.seen(&camera, vec2(x as f32, y as f32)) else { continue };
+                let (larger, smaller, [along, across]) =
+                    principal(curvature_decode(point.curvature, range).0);
+                if larger < 0.005 * range {
+                    continue;
+                }
+                let frame = point.tangent_frame;
+                let direction =
+                    along * frame.x_axis.normalize_or_zero() + across * frame.y_axis.normalize_or_zero();
+                let share = ((larger - smaller.max(0.0)) / larger).clamp(0.0, 1.0);
+                // As long as the spacing where it lies across the view, foreshortened elsewhere.
+                let distance = point.position.distance(self.view.camera.transform.translation.into());
+                let half = 0.55 * SPACING as f32 * distance / focal * (0.2 + 0.8 * share);
+                let off = 0.02 * distance / focal * SPACING as f32 * view;
+                let [a, b] = [-half, half].map(|t| project(point.position + off + t * direction));
+                picture.line(a, b, false_color(0.25 + 0.75 * (larger / range).min(1.0).sqrt()));
+            }
+        }
+        picture
+    }
+}
+
+/// Behind curvature; chosen by eye.
+const BACKDROP: Color = [58, 60, 66];
+
+/// From 0 to 1 over black, red, yellow and white, as the window's.
+fn false_color(x: f32) -> Color {
+    [0.0, 1.0, 2.0].map(|from| ((3.0 * x - from).clamp(0.0, 1.0) * 255.0).round() as u8)
+}
