@@ -11,9 +11,14 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
 }
 
-/// What is used where the device has it: block-compressed textures, and a clock for passes.
+/// What is used where the device has it: block-compressed textures, and a clock for passes. A software device decodes blocks
+/// texel by texel, each time it reads one, and is better off with decoded textures.
 pub fn wanted_features(adapter: &wgpu::Adapter) -> wgpu::Features {
-    adapter.features() & (wgpu::Features::TEXTURE_COMPRESSION_BC | wgpu::Features::TIMESTAMP_QUERY)
+    let blocks = match adapter.get_info().device_type {
+        wgpu::DeviceType::Cpu => wgpu::Features::empty(),
+        _ => wgpu::Features::TEXTURE_COMPRESSION_BC,
+    };
+    adapter.features() & (blocks | wgpu::Features::TIMESTAMP_QUERY)
 }
 
 impl Gpu {
@@ -22,6 +27,14 @@ impl Gpu {
     /// # Errors
     /// [`Error::Gpu`] where there is none; Mesa's lavapipe is one that needs no hardware.
     pub fn open() -> Result<Self, Error> {
+        Self::open_with(wanted_features)
+    }
+
+    /// The same with other features than [`wanted_features`].
+    ///
+    /// # Errors
+    /// As [`Self::open`], and [`Error::Gpu`] where the device lacks one of them.
+    pub fn open_with(features: impl Fn(&wgpu::Adapter) -> wgpu::Features) -> Result<Self, Error> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = wgpu::Backends::VULKAN;
         let options = wgpu::RequestAdapterOptions {
@@ -36,7 +49,7 @@ impl Gpu {
         })?;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("kinran"),
-            required_features: wanted_features(&adapter),
+            required_features: features(&adapter),
             required_limits: adapter.limits(),
             ..Default::default()
         };

@@ -57,6 +57,8 @@ fn probe(direction: vec3f, solid_angle: f32) -> vec3f {
 }
 
 fn background(direction: vec3f) -> vec3f {
-    let seen = textureSampleLevel(environment_map, around_sampler, equirectangular(direction), 0.0).rgb;
-    return select(frame.background.rgb, seen, frame.background.w > 0.5);
+    if frame.background.w < 0.5 {
+        return frame.background.rgb;
+    }
+    return textureSampleLevel(environment_map, around_sampler, equirectangular(direction), 0.0).rgb;
 }

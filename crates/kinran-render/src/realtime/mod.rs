@@ -109,13 +109,14 @@ pub(crate) struct Layouts {
     show: wgpu::BindGroupLayout,
 }
 
-/// Pipelines of every pass; opaque ones for single-sided and double-sided materials.
+/// Pipelines of every pass; those of meshes for single-sided and double-sided materials, the forward ones also without and
+/// with fibres and skin.
 struct Pipelines {
     shadow: wgpu::RenderPipeline,
     cutout: wgpu::RenderPipeline,
     fill: [wgpu::RenderPipeline; 2],
     light: wgpu::RenderPipeline,
-    opaque: [wgpu::RenderPipeline; 2],
+    opaque: [[wgpu::RenderPipeline; 2]; 2],
     sky: wgpu::RenderPipeline,
     transmittance: [wgpu::RenderPipeline; 2],
     blended: [wgpu::RenderPipeline; 2],
@@ -263,7 +264,9 @@ impl Realtime {
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
         for draw in draws(Path::Forward) {
             let material = &scene.materials[draw.material];
-            pass.set_pipeline(&self.pipelines.opaque[usize::from(material.double_sided)]);
+            pass.set_pipeline(
+                &self.pipelines.opaque[usize::from(material.layered)][usize::from(material.double_sided)],
+            );
             pass.set_bind_group(1, &material.bind_group, &[]);
             pass.draw_indexed(draw.indices.clone(), 0, 0..1);
         }
@@ -652,6 +655,8 @@ struct Pass<'a> {
     /// Comparison with the depth buffer, and whether it is written.
     depth: Option<(wgpu::CompareFunction, bool)>,
     cull: bool,
+    /// Values of the fragment shader's `override` constants that are not as written.
+    constants: &'a [(&'a str, f64)],
 }
 
 impl Pipelines {
@@ -696,6 +701,7 @@ impl Pipelines {
             blend: None,
             depth: None,
             cull: false,
+            constants: &[],
         };
         let component = |src_factor, dst_factor| wgpu::BlendComponent {
             src_factor,
@@ -705,26 +711,28 @@ impl Pipelines {
         let blend = |color| wgpu::BlendState { color, alpha: wgpu::BlendComponent::OVER };
         let add = blend(component(wgpu::BlendFactor::One, wgpu::BlendFactor::One));
         let multiply = blend(component(wgpu::BlendFactor::Zero, wgpu::BlendFactor::Src));
-        let on_mesh = |files, fragment, targets, blend, depth| -> Result<[wgpu::RenderPipeline; 2], Error> {
-            let pass = |cull| {
-                pipeline(
-                    device,
-                    source,
-                    &Pass {
-                        files,
-                        groups: &material,
-                        vertex: "vertex",
-                        attributes: 6,
-                        fragment: Some(fragment),
-                        targets,
-                        blend,
-                        depth: Some(depth),
-                        cull,
-                    },
-                )
+        let on_mesh =
+            |files, fragment, targets, blend, depth, constants| -> Result<[wgpu::RenderPipeline; 2], Error> {
+                let pass = |cull| {
+                    pipeline(
+                        device,
+                        source,
+                        &Pass {
+                            files,
+                            groups: &material,
+                            vertex: "vertex",
+                            attributes: 6,
+                            fragment: Some(fragment),
+                            targets,
+                            blend,
+                            depth: Some(depth),
+                            cull,
+                            constants,
+                        },
+                    )
+                };
+                Ok([pass(true)?, pass(false)?])
             };
-            Ok([pass(true)?, pass(false)?])
-        };
         let [base, normal, factors] = G_BUFFER;
         Ok(Self {
             shadow: pipeline(
@@ -752,7 +760,7 @@ impl Pipelines {
                     ..everywhere
                 },
             )?,
-            fill: on_mesh(&fill[..], "fill", &[base, normal, factors, HDR][..], None, (Less, true))?,
+            fill: on_mesh(&fill[..], "fill", &[base, normal, factors, HDR][..], None, (Less, true), &[][..])?,
             light: pipeline(
                 device,
                 source,
@@ -765,7 +773,10 @@ impl Pipelines {
                     ..everywhere
                 },
             )?,
-            opaque: on_mesh(&mesh[..], "opaque", &[HDR][..], None, (Less, true))?,
+            opaque: [
+                on_mesh(&mesh[..], "opaque", &[HDR][..], None, (Less, true), &[("LAYERED", 0.0)][..])?,
+                on_mesh(&mesh[..], "opaque", &[HDR][..], None, (Less, true), &[][..])?,
+            ],
             sky: pipeline(
                 device,
                 source,
@@ -779,8 +790,15 @@ impl Pipelines {
                     ..everywhere
                 },
             )?,
-            transmittance: on_mesh(&mesh[..], "transmittance", &[HDR][..], Some(multiply), (Less, false))?,
-            blended: on_mesh(&mesh[..], "blended", &[HDR][..], Some(add), (Less, false))?,
+            transmittance: on_mesh(
+                &mesh[..],
+                "transmittance",
+                &[HDR][..],
+                Some(multiply),
+                (Less, false),
+                &[][..],
+            )?,
+            blended: on_mesh(&mesh[..], "blended", &[HDR][..], Some(add), (Less, false), &[][..])?,
             accumulate: pipeline(
                 device,
                 source,
@@ -858,7 +876,10 @@ fn pipeline(
         fragment: pass.fragment.map(|entry| wgpu::FragmentState {
             module: &module,
             entry_point: Some(entry),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: pass.constants,
+                ..Default::default()
+            },
             targets: &targets,
         }),
         multiview_mask: None,

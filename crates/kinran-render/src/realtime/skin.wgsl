@@ -14,6 +14,9 @@ struct Skin {
 }
 
 fn skin_at(in: Varying, surface: Surface, front: bool) -> Skin {
+    if !LAYERED {
+        return Skin();
+    }
     let mesh = normalize(in.normal);
     let n = surface.normal;
     return Skin(

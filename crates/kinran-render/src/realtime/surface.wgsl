@@ -1,5 +1,8 @@
 // A material at a point of a mesh.
 
+// False in pipelines for materials that are neither fuzzy nor skin, which are most: their shader is a third as long.
+override LAYERED: bool = true;
+
 struct Material {
     base_color: vec4f,
     // rgb emitted, w occlusion strength.
@@ -148,6 +151,8 @@ fn surface_at(in: Varying, front: bool) -> Surface {
     if material.flags.y == 1u && base.a < material.factors.z {
         surface.opacity = 0.0;
     }
-    surface.fuzz = fuzz_at(in, surface, to_world * side, view);
+    if LAYERED {
+        surface.fuzz = fuzz_at(in, surface, to_world * side, view);
+    }
     return surface;
 }

@@ -40,6 +40,8 @@ pub(super) struct Material {
     pub(super) bind_group: wgpu::BindGroup,
     pub(super) path: Path,
     pub(super) double_sided: bool,
+    /// Fibres or skin; see `LAYERED` in surface.wgsl.
+    pub(super) layered: bool,
     /// Alpha below a cutoff is a hole.
     pub(super) cutout: bool,
 }
@@ -102,6 +104,7 @@ impl GpuScene {
         gpu.queue.write_buffer(&self.materials[index].uniform, 0, &bytes(&floats));
         gpu.queue.write_buffer(&self.materials[index].fuzz, 0, &bytes(&fuzz::floats(material)));
         self.materials[index].path = path(material);
+        self.materials[index].layered = is_layered(material);
     }
 
     pub(super) fn new(
@@ -422,8 +425,13 @@ fn material(
         bind_group,
         path: path(m),
         double_sided: m.double_sided,
+        layered: is_layered(m),
         cutout: matches!(m.alpha_mode, AlphaMode::Mask { .. }),
     }
+}
+
+fn is_layered(m: &RenderMaterial) -> bool {
+    m.fuzz.is_some() || m.skin.is_some()
 }
 
 /// The pass that draws a material.

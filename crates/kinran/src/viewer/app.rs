@@ -659,6 +659,8 @@ impl eframe::App for App {
         }
         let mut wishes = self.keys(&ctx);
 
+        // The controls count the frames before this one, so that the last one needs another.
+        let was_unsettled = self.model.is_some() && !self.settled();
         let shown = Shown {
             name: self.model.as_ref().map_or("no model", |m| &m.opened.name),
             material_names: self.model.as_ref().map_or(&[], |m| &m.opened.material_names),
@@ -697,7 +699,7 @@ impl eframe::App for App {
         self.take_screenshot(&ctx);
 
         // The title names the model, with dots until its picture is smooth.
-        let unsettled = self.model.is_some() && !self.settled();
+        let unsettled = was_unsettled || self.model.is_some() && !self.settled();
         let dots = if unsettled || !self.busy.is_empty() { " …" } else { "" };
         let title = match &self.model {
             Some(model) => format!("{}{dots} - Kinran", file_name(Path::new(&model.opened.name))),
