@@ -13,6 +13,7 @@ use kinran_render::reference::{
     AnisoEncoding, BoundTexture, FuzzCoefficients, MipLevel, MipTexture, SurfaceTextures,
 };
 use kinran_scene::{FuzzPhase, Material, Scene, TextureRef};
+use rayon::prelude::*;
 
 use crate::{Error, Progress};
 
@@ -126,7 +127,7 @@ fn textures<const N: usize>(
     let size = maps.size();
     let Mips::Filtered(filter) = mips else {
         // What is baked already never comes here.
-        return Ok(sheets.map(|sheet| Arc::new(level_0(maps, sheet))));
+        return Ok(level_0(maps, sheets).map(Arc::new));
     };
     let requests = sheets.map(|sheet| {
         let role = if sheet == Sheet::Normal { Role::Normal } else { Role::Aniso };
@@ -147,19 +148,24 @@ fn textures<const N: usize>(
 }
 
 /// The authored texels, uncompressed.
-fn level_0(maps: &SurfaceMaps, sheet: Sheet) -> MipTexture {
+fn level_0<const N: usize>(maps: &SurfaceMaps, sheets: [Sheet; N]) -> [MipTexture; N] {
     let (width, height) = maps.size();
-    let mut span = TexelSpan::default();
-    let mut texels = Vec::with_capacity(width as usize * height as usize);
-    for y in 0..height {
-        maps.decode_span((width, height), y, 0, width as usize, &mut span);
-        texels.extend((0..span.len()).map(|i| {
-            let (n, a) = span.texel(i);
-            let [r, g, b] = sheet.encode(n, a);
-            [r, g, b, 1.0]
-        }));
-    }
-    MipTexture { levels: vec![MipLevel { width, height, texels }], wrap: maps.wrap, encoded: None }
+    let rows: Vec<[Vec<[f32; 4]>; N]> = (0..height)
+        .into_par_iter()
+        .map_init(TexelSpan::default, |span, y| {
+            maps.decode_span((width, height), y, 0, width as usize, span);
+            let texel = |sheet: Sheet, i: usize| {
+                let (n, a) = span.texel(i);
+                let [r, g, b] = sheet.encode(n, a);
+                [r, g, b, 1.0]
+            };
+            sheets.map(|sheet| (0..span.len()).map(|i| texel(sheet, i)).collect())
+        })
+        .collect();
+    std::array::from_fn(|sheet| {
+        let texels = rows.iter().flat_map(|row| &row[sheet]).copied().collect();
+        MipTexture { levels: vec![MipLevel { width, height, texels }], wrap: maps.wrap, encoded: None }
+    })
 }
 
 /// Normals and roughness that lie on the mesh in different ways, each filtered by itself. Roughness is then

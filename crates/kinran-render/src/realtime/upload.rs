@@ -7,6 +7,7 @@ use glam::{Mat3, Vec3, Vec4};
 use half::f16;
 use kinran_image::{Format, Texture, Transfer};
 use kinran_scene::{AlphaMode, Light, Wrap};
+use rayon::prelude::*;
 use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
 
 use super::{Gpu, Layouts, fuzz, probe};
@@ -180,8 +181,18 @@ impl GpuLight {
 }
 
 fn half_levels(levels: &[Vec<Vec3>]) -> Vec<Vec<u8>> {
-    let texel = |c: &Vec3| c.extend(1.0).to_array().map(half).into_iter().flatten();
-    levels.iter().map(|level| level.iter().flat_map(texel).collect()).collect()
+    let opaque = |level: &Vec<Vec3>| level.iter().map(|c| c.extend(1.0).to_array()).collect::<Vec<_>>();
+    levels.iter().map(|level| half_bytes(&opaque(level))).collect()
+}
+
+fn half_bytes(texels: &[[f32; 4]]) -> Vec<u8> {
+    let mut bytes = vec![0; texels.len() * 8];
+    bytes.par_chunks_exact_mut(8).with_min_len(1 << 14).zip(texels).for_each(|(bytes, texel)| {
+        for (bytes, x) in bytes.chunks_exact_mut(2).zip(texel) {
+            bytes.copy_from_slice(&half(*x));
+        }
+    });
+    bytes
 }
 
 /// Bytes of a half float; what is larger than it holds becomes its largest number.
@@ -236,12 +247,8 @@ impl Textures<'_> {
         let gpu = self.gpu;
         let upload = || {
             encoded(gpu, texture).unwrap_or_else(|| {
-                let texel = |t: &[f32; 4]| t.map(half).into_iter().flatten();
-                let levels: Vec<Vec<u8>> = texture
-                    .levels
-                    .iter()
-                    .map(|level| level.texels.iter().flat_map(texel).collect())
-                    .collect();
+                let levels: Vec<Vec<u8>> =
+                    texture.levels.iter().map(|level| half_bytes(&level.texels)).collect();
                 float_texture(gpu, (texture.levels[0].width, texture.levels[0].height), &levels)
             })
         };

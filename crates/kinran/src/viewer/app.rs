@@ -223,10 +223,13 @@ impl App {
     fn methods(&mut self) -> [Option<Mips>; 2] {
         let wanted = self.parameters.methods.map(|i| METHODS[i].1);
         let Some(model) = &mut self.model else { return [None, None] };
-        // Level 0 needs no filter: it is there first.
-        let mut ask = vec![Mips::Level0, wanted[0]];
-        if self.parameters.split {
-            ask.push(wanted[1]);
+        // Level 0 needs no filter: it is there first, and no bake takes the processor from the first picture.
+        let mut ask = vec![Mips::Level0];
+        if model.first_picture.is_some() {
+            ask.push(wanted[0]);
+            if self.parameters.split {
+                ask.push(wanted[1]);
+            }
         }
         for mips in ask {
             if model.asked.insert(mips) {
