@@ -64,7 +64,7 @@ pub(crate) fn generate(primitive: &mut Primitive, uv_set: usize) {
 
 /// A tangent perpendicular to a unit normal: the direction nearest to +y, so that those of neighbouring vertices nearly agree
 /// and what is interpolated in their frames, such as curvature, keeps its meaning. Where the normal is +y or -y there is
-/// none, and any will do [2].
+/// none, and any will do (Duff 2017).
 pub fn arbitrary(normal: Vec3) -> Vec4 {
     let along = Vec3::Y - normal * normal.y;
     let tangent =

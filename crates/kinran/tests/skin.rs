@@ -543,9 +543,9 @@ mod both {
     fn compare(name: &str, model: &Path, more: &[&str], folder: &Path) -> f64 {
         let shots = ["cpu", "gpu"].map(|backend| {
             let picture = folder.join(format!("{name}_{backend}.png"));
-            let samples = if backend == "cpu" { "64" } else { "32" };
+            let samples = if backend == "cpu" { "32" } else { "16" };
             let fixed = ["--quiet", "render", str(model), "-o", str(&picture), "--backend", backend];
-            let rest = ["--spp", samples, "--size", "128x128", "--max-anisotropy", "1", "--env", "none"];
+            let rest = ["--spp", samples, "--size", "96x96", "--max-anisotropy", "1", "--env", "none"];
             done(&[&fixed[..], &rest, more].concat());
             pixels(&picture)
         });

@@ -11,7 +11,7 @@
 use super::bessel::{scaled_i0, scaled_i1};
 use super::profile::{Gaussian, LinearProfile, Shape};
 use core::f64::consts::PI;
-use libm::{asin, cos, exp, sincos, sqrt};
+use libm::{asin, cos, exp, sin, sqrt};
 
 /// Nodes and weights of the Gauss–Legendre rule of four points on [-1, 1].
 const GAUSS_LEGENDRE: [(f64, f64); 4] = [
@@ -25,6 +25,9 @@ const GAUSS_LEGENDRE: [(f64, f64); 4] = [
 /// derivative, is below 1e-8 of their mass.
 const GAUSS_LEGENDRE_SHORT: [(f64, f64); 2] =
     [(-0.577_350_269_189_625_8, 1.0), (0.577_350_269_189_625_8, 1.0)];
+
+/// Up to which angle the ring is integrated over the sine of half of it, radians.
+const SINE_UNTIL: f64 = 2.0 * PI / 3.0;
 
 /// Below this curvature (1/mm; a radius of a kilometre) a surface is flat.
 const FLAT: f64 = 1e-6;
@@ -125,18 +128,34 @@ impl Cumulative<'_, '_> {
         self.at = self.at.max(to);
     }
 
+    /// Adds what lies between two angles. Up to 120° over the sine of half the angle, half the chord over the radius, whose
+    /// nodes need no trigonometry; beyond, where that sine hardly changes any more, over the angle.
     fn piece(&mut self, a: f64, b: f64, rule: &[(f64, f64)]) {
-        let (half, middle) = (0.5 * (b - a), 0.5 * (a + b));
-        for (node, weight) in rule {
-            let (s, c) = sincos(0.5 * (middle + half * node));
-            let density = self.profile.density(2.0 * self.r * s);
-            let (sin, cos) = (2.0 * s * c, 1.0 - 2.0 * s * s);
-            for (c, density) in density.into_iter().enumerate() {
-                let mass = half * weight * density;
-                self.one[c] += mass;
-                self.cos[c] += mass * cos;
-                self.sin[c] += mass * sin;
+        if b > SINE_UNTIL {
+            let (half, middle) = (0.5 * (b - a), 0.5 * (a + b));
+            for (node, weight) in rule {
+                self.add(sin(0.5 * (middle + half * node)), half * weight);
             }
+            return;
+        }
+        let (from, to) = (sin(0.5 * a), sin(0.5 * b));
+        let (half, middle) = (0.5 * (to - from), 0.5 * (to + from));
+        for (node, weight) in rule {
+            let s = middle + half * node;
+            // dθ = 2 ds / cos(θ/2).
+            self.add(s, 2.0 * half * weight / sqrt(1.0 - s * s));
+        }
+    }
+
+    /// Adds the density over `angle` radians about the angle whose half has the sine `s`.
+    fn add(&mut self, s: f64, angle: f64) {
+        let density = self.profile.density(2.0 * self.r * s);
+        let (sin, cos) = (2.0 * s * sqrt(1.0 - s * s), 1.0 - 2.0 * s * s);
+        for (c, density) in density.into_iter().enumerate() {
+            let mass = angle * density;
+            self.one[c] += mass;
+            self.cos[c] += mass * cos;
+            self.sin[c] += mass * sin;
         }
     }
 }
