@@ -676,3 +676,37 @@ fn fibres_grow_on_skin() {
     let red = |c: Vec3| c.x / c.y;
     assert!(red(both) > 1.01 * red(fuzz), "no skin: {both}, {fuzz}");
 }
+
+#[test]
+fn every_sheet_is_drawn_and_shows_something() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("ring.glb");
+    Mesh::torus(0.012, 0.004).write(&model);
+    let out = folder.path().join("sheets");
+    let shared = ["skin", str(&model), "-o", str(&out), "--size", "64x48", "--spp", "1", "--unit-mm", "1000"];
+    let json = done(&[&["--json"], &shared[..], &["--crop", "0.25,0,0.75,1"]].concat());
+    let report: Value = serde_json::from_str(&json).unwrap();
+    // Columns and rows of pictures of 48 by 48 pixels, ten apart.
+    let sizes = [
+        ("turn", Some((6, 3))),
+        ("curvature", None),
+        ("profiles", Some((3, 2))),
+        ("shadows", Some((3, 1))),
+        ("normals", Some((3, 1))),
+        ("tensors", Some((1, 1))),
+    ];
+    assert_eq!(report["files"].as_array().unwrap().len(), sizes.len(), "{json}");
+    for (name, size) in sizes {
+        let (pixels, width) = pixels(&out.join(format!("{name}.png")));
+        if let Some((columns, rows)) = size {
+            let want = (10 + 58 * columns, (26 + 48) * rows + 10);
+            assert_eq!((width, pixels.len() as u32 / width), want, "{name}");
+        }
+        let bright = pixels.iter().filter(|p| p[0] > 120).count();
+        assert!(bright > pixels.len() / 200, "{name} is dark");
+    }
+    let error = refused(&[&shared[..], &["--sheet", "turn", "--base", "2,0,0"]].concat());
+    assert!(error.contains("--base"), "{error}");
+    let (code, _, error) = kinran(&[&shared[..], &["--crop", "0.5,0,0.75,1"]].concat());
+    assert!(code == Some(2) && error.contains("left, top"), "{error}");
+}
