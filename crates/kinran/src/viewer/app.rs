@@ -731,11 +731,23 @@ impl eframe::App for App {
 
 /// How far a button has dragged a part of the window since the last frame, in points; also in the frame that sees its release.
 fn dragged(ui: &egui::Ui, part: &egui::Response, button: egui::PointerButton) -> egui::Vec2 {
-    if part.dragged_by(button) || part.drag_stopped_by(button) {
-        ui.input(|input| input.pointer.delta())
-    } else {
-        egui::Vec2::ZERO
+    if part.dragged_by(button) {
+        return ui.input(|input| input.pointer.delta());
     }
+    if !part.drag_stopped_by(button) {
+        return egui::Vec2::ZERO;
+    }
+    // Where the pointer went after the release is no part of it.
+    ui.input(|input| {
+        let released = input.events.iter().find_map(|event| match *event {
+            egui::Event::PointerButton { pos, button: which, pressed: false, .. } if which == button => {
+                Some(pos)
+            }
+            _ => None,
+        });
+        let before = input.pointer.latest_pos().map(|now| now - input.pointer.delta());
+        released.zip(before).map_or(egui::Vec2::ZERO, |(to, from)| to - from)
+    })
 }
 
 /// An exposure so many thirds of a stop away, rounded so that three steps there and back lead to where they began.
