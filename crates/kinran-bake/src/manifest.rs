@@ -68,10 +68,12 @@ pub enum Kind {
     Mesh,
     /// Targets of detail maps.
     Detail,
+    /// Diffusion profiles, for the tables of skin; without an input human skin.
+    Skin,
 }
 
 impl Kind {
-    const ALL: [Kind; 3] = [Kind::Aniso, Kind::Mesh, Kind::Detail];
+    const ALL: [Kind; 4] = [Kind::Aniso, Kind::Mesh, Kind::Detail, Kind::Skin];
 
     /// The name of its entries: `[[name]]`.
     pub fn name(self) -> &'static str {
@@ -79,6 +81,7 @@ impl Kind {
             Kind::Aniso => "aniso",
             Kind::Mesh => "mesh",
             Kind::Detail => "detail",
+            Kind::Skin => "skin",
         }
     }
 
@@ -88,6 +91,7 @@ impl Kind {
             Kind::Aniso => "a folder of maps",
             Kind::Mesh => "a .glb or .gltf file",
             Kind::Detail => "an image",
+            Kind::Skin => "a profile, .csv or .json",
         }
     }
 
@@ -97,6 +101,7 @@ impl Kind {
             Kind::Aniso => path.is_dir(),
             Kind::Mesh => path.is_file() && (is("glb") || is("gltf")),
             Kind::Detail => path.is_file() && EXTENSIONS.into_iter().any(is),
+            Kind::Skin => path.is_file() && (is("csv") || is("json")),
         }
     }
 }
@@ -130,7 +135,7 @@ pub struct Job {
     pub kind: Kind,
     /// The input as a person would name it: relative to the manifest where it is under it, `/`-separated.
     pub name: String,
-    /// The input.
+    /// The input; empty for human skin.
     pub input: PathBuf,
     /// The folder of its files, relative to the library's output.
     pub folder: PathBuf,
@@ -292,6 +297,10 @@ impl Manifest {
         let mut jobs: Vec<Result<Job, ManifestError>> = Vec::new();
         for entry in &self.entries {
             let excluded = self.excluded(entry);
+            if entry.inputs.is_empty() {
+                let job = self.job(entry, &entry.place, PathBuf::new(), &jobs);
+                jobs.push(job);
+            }
             for (pattern, place) in &entry.inputs {
                 match self.matches(entry.kind, pattern, place) {
                     Err(error) => jobs.push(Err(error)),
@@ -317,6 +326,7 @@ impl Manifest {
         let name = match entry.kind {
             Kind::Aniso => input.file_name(),
             Kind::Mesh | Kind::Detail => input.file_stem(),
+            Kind::Skin => input.file_stem().or(Some("skin".as_ref())),
         };
         let Some(name) = name.map(PathBuf::from) else {
             return Err(
@@ -331,14 +341,15 @@ impl Manifest {
                 place,
                 format!(
                     "{} and {} of line {line} would both be baked to {}; give one entry another `output`",
-                    self.name(&input),
+                    if input.as_os_str().is_empty() { "skin".into() } else { self.name(&input) },
                     other.name,
                     folder.display()
                 ),
             ));
         }
         let (kind, settings) = (entry.kind, entry.settings.clone());
-        Ok(Job { kind, name: self.name(&input), input, folder, settings, place: place.clone() })
+        let name = if input.as_os_str().is_empty() { "skin".into() } else { self.name(&input) };
+        Ok(Job { kind, name, input, folder, settings, place: place.clone() })
     }
 
     /// The path as it would stand in the manifest.
@@ -476,7 +487,7 @@ impl Manifest {
                 _ => entry.settings.push(self.setting(key, value)?),
             }
         }
-        if entry.inputs.is_empty() {
+        if entry.inputs.is_empty() && kind != Kind::Skin {
             return Err(self.error(
                 &entry.place,
                 format!("this entry has no `input`; expected {} or a pattern of several", kind.inputs()),

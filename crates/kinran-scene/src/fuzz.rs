@@ -199,7 +199,7 @@ impl Fuzz {
 }
 
 /// The object under a key, made where there is none.
-fn entry<'a>(object: &'a mut Map<String, Value>, key: &str) -> &'a mut Map<String, Value> {
+pub(crate) fn entry<'a>(object: &'a mut Map<String, Value>, key: &str) -> &'a mut Map<String, Value> {
     let value = object.entry(key).or_insert_with(|| json!({}));
     if !value.is_object() {
         *value = json!({});
@@ -208,7 +208,7 @@ fn entry<'a>(object: &'a mut Map<String, Value>, key: &str) -> &'a mut Map<Strin
 }
 
 /// The shortest decimal that reads as this number in single precision.
-fn number(x: f32) -> Value {
+pub(crate) fn number(x: f32) -> Value {
     x.to_string().parse::<f64>().map_or(Value::Null, |x| json!(x))
 }
 

@@ -6,6 +6,7 @@
 
 mod accessor;
 mod container;
+mod detail;
 mod document;
 mod environment;
 mod error;
@@ -18,6 +19,9 @@ mod scene;
 mod studio;
 mod tangent;
 
+pub use detail::{
+    DETAIL_EXTENSION, DETAIL_LAYERS_MAX, Detail, DetailLayer, DetailMap, DetailMask, LayerTransform,
+};
 pub use document::{Attribute, Document, Object, Slot, TextureExtension};
 pub use environment::Environment;
 pub use error::Error;

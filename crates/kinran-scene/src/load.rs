@@ -1,5 +1,7 @@
 //! Reads a glTF document into a [`Scene`].
 
+mod detail;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -21,7 +23,7 @@ use crate::{
 /// Extensions that may stand in `extensionsRequired`: those this module reads, and those that change how
 /// a surface looks but leave the rest of the document as it is; the latter are listed in
 /// [`Material::ignored_extensions`] or in [`Scene::warnings`].
-const ADMITTED_EXTENSIONS: [&str; 26] = [
+const ADMITTED_EXTENSIONS: [&str; 27] = [
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -43,6 +45,7 @@ const ADMITTED_EXTENSIONS: [&str; 26] = [
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
     "KINRAN_materials_aniso",
+    "KINRAN_materials_detail",
     "KINRAN_materials_fuzz",
     "KINRAN_materials_skin",
     "KINRAN_mesh_curvature",
@@ -51,12 +54,13 @@ const ADMITTED_EXTENSIONS: [&str; 26] = [
 ];
 
 /// Material extensions that [`Material`] represents.
-const READ_MATERIAL_EXTENSIONS: [&str; 7] = [
+const READ_MATERIAL_EXTENSIONS: [&str; 8] = [
     "KHR_materials_anisotropy",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
     "KHR_materials_sheen",
     "KINRAN_materials_aniso",
+    "KINRAN_materials_detail",
     "KINRAN_materials_fuzz",
     "KINRAN_materials_skin",
 ];
@@ -313,6 +317,7 @@ impl Loader<'_> {
             aniso,
             skin: self.skin(&material.extensions, &what)?,
             fuzz: self.fuzz(material, &what)?,
+            detail: self.detail(&material.extensions, &what)?,
             diffuse_transmission,
             alpha_mode: match material.alpha_mode {
                 json::AlphaMode::Opaque => AlphaMode::Opaque,

@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
 
-use crate::Fuzz;
+use crate::{Detail, Fuzz};
 
 /// How a texture repeats outside the unit square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -172,6 +172,8 @@ pub struct Material {
     pub skin: Option<Skin>,
     /// `KINRAN_materials_fuzz`, or `KHR_materials_sheen` as upright fibres.
     pub fuzz: Option<Fuzz>,
+    /// `KINRAN_materials_detail`, when present.
+    pub detail: Option<Detail>,
     /// `KHR_materials_diffuse_transmission`, when present.
     pub diffuse_transmission: Option<DiffuseTransmission>,
     /// Transparency.
@@ -202,6 +204,7 @@ impl Default for Material {
             aniso: None,
             skin: None,
             fuzz: None,
+            detail: None,
             diffuse_transmission: None,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
@@ -229,6 +232,7 @@ impl Material {
         .into_iter()
         .flatten()
         .chain(self.fuzz.iter().flat_map(Fuzz::textures))
+        .chain(self.detail.iter().flat_map(Detail::textures))
     }
 }
 

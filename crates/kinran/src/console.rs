@@ -6,12 +6,14 @@ use serde::Serialize;
 use crate::{Error, Progress};
 
 /// Where a command's words go: results to standard output, everything else to standard error.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Console {
     /// Errors only.
     pub quiet: bool,
     /// Results as JSON.
     pub json: bool,
+    /// Shows these bars, whatever is said above: those of work that is a part of other work.
+    pub bars: Option<Progress>,
 }
 
 impl Console {
@@ -57,6 +59,6 @@ impl Console {
 
     /// Progress bars that show unless quiet or JSON is asked for.
     pub fn progress(&self) -> Progress {
-        Progress::new(!self.quiet && !self.json)
+        self.bars.clone().unwrap_or_else(|| Progress::new(!self.quiet && !self.json))
     }
 }

@@ -2,7 +2,7 @@
 
 mod brocade;
 mod brushed_disc;
-mod glb;
+pub(crate) mod glb;
 mod maps;
 mod mesh;
 pub(crate) mod noise;
@@ -228,7 +228,7 @@ fn bake_textures(maps: &Path, output: &Path) -> Result<(), Error> {
     }
     let words = [Path::new("bake"), maps, Path::new("--output"), output].map(Path::as_os_str);
     let flags = Flags::try_parse_from(words).map_err(|e| Error::Internal(e.to_string()))?;
-    bake::run(&flags.bake, &Console { quiet: true, json: false })
+    bake::run(&flags.bake, &Console { quiet: true, ..Console::default() })
 }
 
 /// The model's own camera and lights; of the built-in studio only the diffuse light, which has no noise.

@@ -2,6 +2,7 @@
 
 mod layer_flag;
 mod library;
+mod model;
 mod page;
 mod solve;
 

@@ -62,7 +62,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let console = Console { quiet: cli.quiet, json: cli.json };
+    let console = Console { quiet: cli.quiet, json: cli.json, bars: None };
     match start_threads(cli.threads).and_then(|()| run(&cli.command, &console)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -127,7 +127,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         let text = text(language, args.module.as_deref(), &chosen)?;
         let report = Report { language, files: Vec::new(), text: Some(text.clone()) };
         // The text is what was asked for, not a summary of it.
-        return Console { quiet: false, ..*console }.result(&report, &text);
+        return Console { quiet: false, ..console.clone() }.result(&report, &text);
     };
     outputs::check_folder(folder)?;
     let files = write(language, args.module.is_none(), &chosen, folder)?;

@@ -27,7 +27,7 @@ use crate::{Console, Error};
 /// plot of the first two with their axes, NAME.kinran.json says how they were made and what was lost.
 ///
 /// Values stand in the middle of texels: sample with linear filtering and clamped edges, without mips.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran skin-lut -o tables/
   kinran skin-lut -o tables/ --size 128x64 --format srgb8 --container dds

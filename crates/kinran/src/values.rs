@@ -36,6 +36,11 @@ pub(crate) fn number(text: &str, range: std::ops::RangeInclusive<f32>) -> Result
     }
 }
 
+/// Names, one after the other, as messages list them.
+pub(crate) fn list(names: &[String]) -> String {
+    if names.is_empty() { "none".into() } else { names.join(", ") }
+}
+
 /// A filter's name.
 pub(crate) fn filter(text: &str) -> Result<Filter, String> {
     Filter::ALL.into_iter().find(|f| f.name() == text).ok_or_else(|| {

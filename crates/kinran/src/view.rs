@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, ValueEnum};
 use glam::{Affine3A, Mat3, Vec3};
 use kinran_render::reference::{
-    Background, Film, RenderScene, Settings, SurfaceTextures, TextureFiltering, look_at, render,
+    Background, DetailShown, Film, RenderScene, Settings, SurfaceTextures, TextureFiltering, look_at, render,
 };
 use kinran_render::tonemap::{Tonemap, to_srgb8};
 use kinran_scene::{Camera, Environment, Light, LightKind, Scene};
@@ -82,6 +82,35 @@ pub struct ViewArgs {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub skin: SkinArgs,
+
+    /// What is shown of maps that are blended from tiles
+    #[arg(long, value_enum, default_value_t)]
+    pub detail: DetailName,
+}
+
+/// What is shown of maps that are blended from tiles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum DetailName {
+    /// Tiles and synthesized map together
+    #[default]
+    Blended,
+    /// The tiles alone
+    Detail,
+    /// The synthesized map alone
+    Synthesized,
+    /// The material's own maps, which were to be reproduced
+    Target,
+}
+
+impl From<DetailName> for DetailShown {
+    fn from(name: DetailName) -> Self {
+        match name {
+            DetailName::Blended => DetailShown::Blended,
+            DetailName::Detail => DetailShown::Detail,
+            DetailName::Synthesized => DetailShown::Synthesized,
+            DetailName::Target => DetailShown::Target,
+        }
+    }
 }
 
 /// Where light from all around comes from.
@@ -131,6 +160,8 @@ pub struct View {
     pub tonemap: Tonemap,
     /// How skin is lit.
     pub skin: SkinArgs,
+    /// What is shown of maps that are blended from tiles.
+    pub detail: DetailShown,
 }
 
 /// Radiance behind models where no environment's file is given; chosen by eye.
@@ -213,6 +244,7 @@ impl View {
                 Curve::None => Tonemap::None,
             },
             skin: args.skin.clone(),
+            detail: args.detail.into(),
         };
         Ok(View { camera: view.camera_at(args.distance), ..view })
     }
@@ -246,6 +278,7 @@ impl View {
         prepared.fit_fuzz(fuzz_coefficients);
         prepared.lights.clone_from(&self.lights);
         attach_skin(scene, &mut prepared, &self.skin)?;
+        prepared.materials.iter_mut().filter_map(|m| m.detail.as_mut()).for_each(|d| d.shown = self.detail);
         Ok(prepared)
     }
 

@@ -1,6 +1,7 @@
 //! `kinran view`: a window with every parameter on a slider.
 
 mod app;
+mod detail;
 mod fuzz;
 mod loader;
 mod orbit;

@@ -420,6 +420,86 @@ fn a_target_is_solved_otherwise_than_by_hand() {
     assert!(said.contains("a layer knows no sclae=2"), "{said}");
 }
 
+#[test]
+fn what_left_the_manifest_stays_unseen_or_takes_changed_files_with_it() {
+    let library = Library::new(3);
+    assert!(all(&library.statuses(&[]), "baked"));
+    fs::remove_dir_all(library.path("materials/cloth01")).unwrap();
+    fs::remove_dir_all(library.path("materials/cloth02")).unwrap();
+    let names = |report: &Value, key: &str| {
+        let folders = report[key].as_array().unwrap().iter();
+        folders.map(|folder| folder.as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let (_, report, _) = library.bake(&[]);
+    assert_eq!(names(&report, "left_over"), ["cloth01", "cloth02"]);
+    let before = library.output();
+    let (_, report, _) = library.bake(&["--prune", "--dry-run"]);
+    assert_eq!(names(&report, "pruned"), ["cloth01", "cloth02"]);
+    assert_eq!(library.output(), before, "--dry-run removed something");
+
+    // What a person changed or added stays.
+    let changed = library.path("baked/cloth02/cloth02.kinran.json");
+    assert!(changed.exists(), "{:?}", before.keys());
+    fs::write(&changed, "mine").unwrap();
+    fs::write(library.path("baked/cloth02/notes.txt"), "mine").unwrap();
+    let (code, report, said) = library.bake(&["--prune"]);
+    assert_eq!(
+        (code, names(&report, "pruned")),
+        (Some(0), vec!["cloth01".into(), "cloth02".into()]),
+        "{said}"
+    );
+    assert!(!library.path("baked/cloth01").exists());
+    let left: Vec<String> = tree(&library.path("baked/cloth02")).into_keys().collect();
+    assert_eq!(left, ["cloth02.kinran.json", "notes.txt"]);
+    assert!(library.path("baked/cloth00").exists() && library.path("baked/models").exists());
+    let (_, report, _) = library.bake(&[]);
+    assert!(names(&report, "left_over").is_empty() && names(&report, "pruned").is_empty());
+
+    // While an input is missing, nobody knows which folder is its.
+    library.describe("[[aniso]]\ninput = \"materials/cloth09\"\n");
+    let (code, report, _) = library.bake(&["--prune"]);
+    assert_eq!((code, names(&report, "pruned").len()), (Some(2), 0));
+    assert!(library.path("baked/cloth00").exists());
+}
+
+#[test]
+fn tables_of_skin_differ_from_those_made_by_hand() {
+    let library = Library::new(0);
+    fs::create_dir(library.path("profiles")).unwrap();
+    let profile = r#"{ "gaussians": [ { "variance": 0.2, "weight": [0.5, 0.3, 1] }, { "variance": 1.5, "weight": [0.5, 0.7, 0] } ] }"#;
+    fs::write(library.path("profiles/alien.json"), profile).unwrap();
+    let manifest = "[defaults]\nsize = \"32x32\"\nfilter = \"linear\"\n[[skin]]\noutput = \"human\"\n\
+                    [[skin]]\ninput = \"profiles/*.json\"\nscale = 2\npenumbra = true\n";
+    library.describe(manifest);
+    assert!(all(&library.statuses(&[]), "baked"));
+    let by_hand = |more: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_kinran"))
+            .args(["skin-lut", "--size", "32x32", "-o", "by_hand"])
+            .args(more)
+            .current_dir(library.root.path())
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let files = tree(&library.path("by_hand"));
+        fs::remove_dir_all(library.path("by_hand")).unwrap();
+        files
+    };
+    assert_eq!(tree(&library.path("baked/human/skin")), by_hand(&[]));
+    let alien = by_hand(&["--profile", "profiles/alien.json", "--scale", "2", "--penumbra"]);
+    assert_eq!(tree(&library.path("baked/alien")), alien);
+
+    assert!(all(&library.statuses(&[]), "up-to-date"));
+    fs::write(library.path("profiles/alien.json"), profile.replace("1.5", "1.6")).unwrap();
+    let statuses = library.statuses(&[]);
+    assert_eq!(
+        (statuses["skin"].as_str(), statuses["profiles/alien.json"].as_str()),
+        ("up-to-date", "baked")
+    );
+    library.describe("[[skin]]\nburly = \"1,1,1\"\n");
+    let said = String::from_utf8(library.command(&[]).output().unwrap().stderr).unwrap();
+    assert!(said.contains("kinran.toml:3:1: unknown key `burly`") && said.contains("burley"), "{said}");
+}
+
 /// Waits until `done`, at most half a minute.
 fn wait(what: &str, done: impl Fn() -> bool) {
     let started = Instant::now();

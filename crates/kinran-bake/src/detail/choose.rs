@@ -1,4 +1,4 @@
-//! Which block of several to keep: the one whose blended result is nearest to the target. For BC1 and BC4.
+//! Which block of many to keep: the one whose blended result is nearest to the target.
 //!
 //! An encoder sees `s` alone and weighs all texels alike. But the blend has slope 0.1 here and 4 there, and texels
 //! next to each other have different tiles under them, so of many blocks equally near to `s` one is much nearer to the
@@ -9,14 +9,82 @@
     reason = "loops over lanes of known length are what compilers vectorise"
 )]
 
+mod bc1;
+mod bc4;
+mod bc5;
+mod bc7;
+
 use kinran_image::Format;
 
 use super::code::{code_from_linear, linear_from_byte};
 use super::map::MapKind;
-use super::solve::{Blend, Operator, Plain, Smooth};
+use super::solve::{Blend, Operator, Over, Plain, Smooth};
 
 /// Texels of a block.
 const TEXELS: usize = 16;
+
+/// Formats whose blocks are chosen by what they are blended to.
+pub(crate) fn can_choose(format: Format, kind: MapKind) -> bool {
+    matches!(
+        (format, kind),
+        (Format::Bc1 | Format::Bc7, MapKind::Color | MapKind::Data | MapKind::Aniso)
+            | (Format::Bc4, MapKind::Data)
+            | (Format::Bc5, MapKind::Normal)
+    )
+}
+
+/// Formats whose blocks are made here from the start, without an encoder's to begin with.
+pub(crate) fn makes_its_own(format: Format) -> bool {
+    format == Format::Bc1
+}
+
+/// How a map is blended. Chosen for sixteen texels at a time, not for each block: code for every way would be thrice as
+/// long.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Blending {
+    Smooth,
+    Plain,
+    Over(f32),
+}
+
+/// How `s` is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stored {
+    /// So that byte 128 is 1/2.
+    Linear,
+    /// The same, as sRGB code.
+    Srgb,
+    /// As it is: aniso texels.
+    Plain,
+}
+
+impl Stored {
+    /// What is stored for `s`, 0 to 1, and the derivative of `s` by it; the inverse of
+    /// [`detail_from_texel`](kinran_shading::detail::detail_from_texel), through the sRGB curve where that is stored.
+    #[inline(always)]
+    fn texel(self, s: f32) -> (f32, f32) {
+        let texel = (s * 254.0 + 1.0) * (1.0 / 255.0);
+        match self {
+            Stored::Plain => (s, 1.0),
+            Stored::Linear => (texel, 255.0 / 254.0),
+            Stored::Srgb => {
+                let code = code_from_linear(texel);
+                let slope = if texel <= 0.003_130_8 { 1.0 / 12.92 } else { 2.4 * texel / (code + 0.055) };
+                (code, slope * (255.0 / 254.0))
+            }
+        }
+    }
+
+    /// The `s` that a stored byte stands for.
+    #[inline(always)]
+    fn value(self, byte: u8) -> f32 {
+        let texel = match self {
+            Stored::Srgb => linear_from_byte(byte),
+            _ => f32::from(byte) * (1.0 / 255.0),
+        };
+        if self == Stored::Plain { texel } else { (texel * (255.0 / 254.0) - 1.0 / 254.0).max(0.0) }
+    }
+}
 
 /// The blocks of a band of one level.
 pub(crate) struct ChooseBand<'a> {
@@ -28,10 +96,11 @@ pub(crate) struct ChooseBand<'a> {
     pub(crate) detail: &'a [[Vec<f32>; 3]],
     pub(crate) kind: MapKind,
     pub(crate) blend: Blend,
-    /// `s` is stored as sRGB code.
-    pub(crate) srgb: bool,
+    /// Opacity over aniso maps.
+    pub(crate) alpha: f32,
+    pub(crate) stored: Stored,
     pub(crate) format: Format,
-    /// What an encoder made of `s`.
+    /// What an encoder made of `s`, unless the format [`makes_its_own`].
     pub(crate) blocks: &'a mut [u8],
 }
 
@@ -40,54 +109,65 @@ impl pulp::WithSimd for ChooseBand<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        match self.blend {
-            Blend::Smooth => self.choose(Smooth),
-            Blend::Plain => self.choose(Plain),
-        }
+        let blend = match (self.kind, self.blend) {
+            (MapKind::Normal, _) => return self.choose_normals(),
+            (MapKind::Aniso, _) => Blending::Over(self.alpha),
+            (_, Blend::Smooth) => Blending::Smooth,
+            (_, Blend::Plain) => Blending::Plain,
+        };
+        self.choose(blend);
     }
 }
 
 impl ChooseBand<'_> {
     #[inline(always)]
-    fn choose(self, blend: impl Operator) {
+    fn choose(self, blend: Blending) {
+        let size = if self.format == Format::Bc7 { 16 } else { 8 };
         let columns = self.width.div_ceil(4);
-        for (i, block) in self.blocks.as_chunks_mut::<8>().0.iter_mut().enumerate() {
-            let (x0, y0) = (i % columns * 4, i / columns * 4);
-            let mut goal = BlockGoal::zeros();
-            let columns_inside = 4.min(self.width - x0);
-            let mut inside = [0.0; TEXELS];
-            for (y, (target, detail)) in self.target[y0..].iter().zip(&self.detail[y0..]).take(4).enumerate()
-            {
-                let row = 4 * y..4 * y + columns_inside;
-                inside[row.clone()].fill(1.0);
-                for channel in 0..3 {
-                    goal.t[channel][row.clone()].copy_from_slice(&target[channel][x0..x0 + columns_inside]);
-                    goal.d[channel][row.clone()].copy_from_slice(&detail[channel][x0..x0 + columns_inside]);
-                }
-            }
-            for channel in 0..3 {
-                for i in 0..TEXELS {
-                    goal.gain[channel][i] = code_gain(self.kind, goal.t[channel][i]) * inside[i];
-                }
-            }
-            for channel in 0..3 {
-                for i in 0..TEXELS {
-                    let s = blend.inverse(goal.t[channel][i], goal.d[channel][i]);
-                    let (v, slope) = stored(s, self.srgb);
-                    let step = blend.slope(s, goal.d[channel][i]) * goal.gain[channel][i] * slope;
-                    goal.v[channel][i] = v;
-                    goal.weight[channel][i] = step * step;
-                }
-            }
-            match self.format {
-                Format::Bc4 => choose_bc4(block, &goal, blend),
-                _ => choose_bc1(block, &goal, self.srgb, blend),
+        for i in 0..self.blocks.len() / size {
+            let mut goal = self.goal(i % columns * 4, i / columns * 4);
+            goal.solve(blend, self.stored);
+            let block = &mut self.blocks[i * size..][..size];
+            match (self.format, block.len()) {
+                (Format::Bc4, 8) => bc4::choose(block, &goal, blend),
+                (Format::Bc7, 16) => bc7::choose(block, &goal, self.stored, blend),
+                _ => block.copy_from_slice(&bc1::choose(&goal, self.stored, blend)),
             }
         }
     }
+
+    #[inline(always)]
+    fn choose_normals(self) {
+        let columns = self.width.div_ceil(4);
+        for i in 0..self.blocks.len() / 16 {
+            let goal = self.goal(i % columns * 4, i / columns * 4);
+            bc5::choose(&mut self.blocks[i * 16..][..16], &goal);
+        }
+    }
+
+    /// Target and detail of the block whose first texel is (`x0`, `y0`).
+    #[inline(always)]
+    fn goal(&self, x0: usize, y0: usize) -> BlockGoal {
+        let mut goal = BlockGoal::zeros();
+        let columns = 4.min(self.width - x0);
+        for (y, (target, detail)) in self.target[y0..].iter().zip(&self.detail[y0..]).take(4).enumerate() {
+            let row = 4 * y..4 * y + columns;
+            goal.inside[row.clone()].fill(1.0);
+            for channel in 0..3 {
+                goal.t[channel][row.clone()].copy_from_slice(&target[channel][x0..x0 + columns]);
+                goal.d[channel][row.clone()].copy_from_slice(&detail[channel][x0..x0 + columns]);
+            }
+        }
+        for channel in 0..3 {
+            for i in 0..TEXELS {
+                goal.gain[channel][i] = code_gain(self.kind, goal.t[channel][i]) * goal.inside[i];
+            }
+        }
+        goal
+    }
 }
 
-/// What a block of `s` should achieve, for colour and data, texels row by row.
+/// What a block of `s` should achieve, texels row by row.
 struct BlockGoal {
     /// The exact solution as it would be stored, 0 to 1.
     v: [[f32; TEXELS]; 3],
@@ -99,13 +179,125 @@ struct BlockGoal {
     t: [[f32; TEXELS]; 3],
     /// Steps of 8 bits for a difference of one in the blended value; zero outside of the image.
     gain: [[f32; TEXELS]; 3],
+    /// 1 in the image, 0 outside.
+    inside: [f32; TEXELS],
 }
 
 impl BlockGoal {
     fn zeros() -> Self {
         let zeros = [[0.0; TEXELS]; 3];
-        BlockGoal { v: zeros, weight: zeros, d: zeros, t: zeros, gain: zeros }
+        BlockGoal { v: zeros, weight: zeros, d: zeros, t: zeros, gain: zeros, inside: [0.0; TEXELS] }
     }
+
+    /// Sets the exact solution and its weights.
+    #[inline(always)]
+    fn solve(&mut self, blend: Blending, stored: Stored) {
+        match blend {
+            Blending::Smooth => self.solve_by(Smooth, stored),
+            Blending::Plain => self.solve_by(Plain, stored),
+            Blending::Over(alpha) => self.solve_by(Over(alpha), stored),
+        }
+    }
+
+    #[inline(always)]
+    fn solve_by(&mut self, operator: impl Operator, stored: Stored) {
+        for channel in 0..3 {
+            for i in 0..TEXELS {
+                let s = operator.inverse(self.t[channel][i], self.d[channel][i]);
+                let (v, slope) = stored.texel(s);
+                let step = operator.slope(s, self.d[channel][i]) * self.gain[channel][i] * slope;
+                self.v[channel][i] = v;
+                // A texel that hardly matters still has a place.
+                self.weight[channel][i] = step * step + self.inside[i];
+            }
+        }
+    }
+
+    /// Squared differences to the target in one channel where texels have `s`.
+    #[inline(always)]
+    fn errors(&self, channel: usize, s: &[f32; TEXELS], blend: Blending) -> [f32; TEXELS] {
+        let (d, t, gain) = (&self.d[channel], &self.t[channel], &self.gain[channel]);
+        match blend {
+            Blending::Smooth => errors_by(Smooth, s, d, t, gain),
+            Blending::Plain => errors_by(Plain, s, d, t, gain),
+            Blending::Over(alpha) => errors_by(Over(alpha), s, d, t, gain),
+        }
+    }
+
+    /// Two colours on either end of the line along which the solution lies, as far as it reaches.
+    #[inline(always)]
+    fn line(&self) -> [[f32; 3]; 2] {
+        let (mut total, mut scale) = ([0.0; 3], [0.0; 3]);
+        for channel in 0..3 {
+            total[channel] = sum(&self.weight[channel]);
+            scale[channel] = total[channel].max(1e-20).sqrt();
+        }
+        let mut texel_weight = [0.0; TEXELS];
+        for channel in 0..3 {
+            for i in 0..TEXELS {
+                texel_weight[i] += self.weight[channel][i];
+            }
+        }
+        // Deviations from the mean, in units in which all channels count alike.
+        let mut p = [[0.0; TEXELS]; 3];
+        let mut mean = [0.0; 3];
+        for channel in 0..3 {
+            let mut weighted = [0.0; TEXELS];
+            for i in 0..TEXELS {
+                weighted[i] = self.weight[channel][i] * self.v[channel][i];
+            }
+            mean[channel] = sum(&weighted) / total[channel].max(1e-20);
+            for i in 0..TEXELS {
+                p[channel][i] = (self.v[channel][i] - mean[channel]) * scale[channel] * self.inside[i];
+            }
+        }
+        let mut weighted = p;
+        for channel in 0..3 {
+            for i in 0..TEXELS {
+                weighted[channel][i] *= texel_weight[i];
+            }
+        }
+        let (xx, yy, zz) = (dot(&p[0], &weighted[0]), dot(&p[1], &weighted[1]), dot(&p[2], &weighted[2]));
+        let (xy, xz, yz) = (dot(&p[0], &weighted[1]), dot(&p[0], &weighted[2]), dot(&p[1], &weighted[2]));
+        // The power method, from the column of the largest variance.
+        let mut axis = if xx >= yy && xx >= zz {
+            [xx, xy, xz]
+        } else if yy >= zz {
+            [xy, yy, yz]
+        } else {
+            [xz, yz, zz]
+        };
+        for _ in 0..4 {
+            let [x, y, z] = axis;
+            axis = [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z];
+            let largest = axis.iter().fold(1e-20_f32, |m, a| m.max(a.abs()));
+            axis = axis.map(|a| a / largest);
+        }
+        let length = (axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]).max(1e-20);
+        let (mut low, mut high) = (0.0_f32, 0.0_f32);
+        for i in 0..TEXELS {
+            let along = (p[0][i] * axis[0] + p[1][i] * axis[1] + p[2][i] * axis[2]) / length;
+            (low, high) = (low.min(along), high.max(along));
+        }
+        let at = |along: f32| std::array::from_fn(|c| (mean[c] + along * axis[c] / scale[c]).clamp(0.0, 1.0));
+        [at(high), at(low)]
+    }
+}
+
+#[inline(always)]
+fn errors_by(
+    operator: impl Operator,
+    s: &[f32; TEXELS],
+    d: &[f32; TEXELS],
+    t: &[f32; TEXELS],
+    gain: &[f32; TEXELS],
+) -> [f32; TEXELS] {
+    let mut errors = [0.0; TEXELS];
+    for i in 0..TEXELS {
+        let difference = (operator.blend(s[i], d[i]) - t[i]) * gain[i];
+        errors[i] = difference * difference;
+    }
+    errors
 }
 
 /// Steps of 8 bits of the map's code for a small difference at the target `t`: for colour the slope of the sRGB curve,
@@ -121,161 +313,21 @@ fn code_gain(kind: MapKind, t: f32) -> f32 {
     255.0 * if kind == MapKind::Color { slope } else { 1.0 }
 }
 
-/// Formats in which blocks are chosen by what they are blended to.
-pub(crate) fn can_choose(format: Format, kind: MapKind) -> bool {
-    matches!((format, kind), (Format::Bc1, MapKind::Color | MapKind::Data) | (Format::Bc4, MapKind::Data))
-}
-
-/// What is stored for `s`, 0 to 1, and the derivative of `s` by it; the inverse of
-/// [`detail_from_texel`](kinran_shading::detail::detail_from_texel), through the sRGB curve where that is stored.
-#[inline(always)]
-fn stored(s: f32, srgb: bool) -> (f32, f32) {
-    let texel = (s * 254.0 + 1.0) * (1.0 / 255.0);
-    if !srgb {
-        return (texel, 255.0 / 254.0);
-    }
-    let code = code_from_linear(texel);
-    let slope = if texel <= 0.003_130_8 { 1.0 / 12.92 } else { 2.4 * texel / (code + 0.055) };
-    (code, slope * (255.0 / 254.0))
-}
-
-/// The `s` that a stored byte stands for.
-#[inline(always)]
-fn synthesized(byte: u8, srgb: bool) -> f32 {
-    let texel = if srgb { linear_from_byte(byte) } else { f32::from(byte) * (1.0 / 255.0) };
-    (texel * (255.0 / 254.0) - 1.0 / 254.0).max(0.0)
-}
-
-/// Rounds of fitting end points to the texels that chose them. The third gains less than a thousandth.
-const ROUNDS: usize = 2;
-
-/// Replaces a BC1 block by one whose blended result is nearer to the target, if there is one: texels choose again among
-/// its four colours by what they are blended to; then the end points follow by least squares, weighted by the slope of
-/// the blend; and so on.
-#[inline(always)]
-fn choose_bc1(block: &mut [u8; 8], goal: &BlockGoal, srgb: bool, blend: impl Operator) {
-    let ends = [u16::from_le_bytes([block[0], block[1]]), u16::from_le_bytes([block[2], block[3]])];
-    // The mode with three colours and black is not for maps without holes.
-    if ends[0] < ends[1] {
-        return;
-    }
-    let mut best = assign(ends, goal, srgb, blend);
-    for _ in 0..ROUNDS {
-        let ends = fit(&best.choices, goal);
-        if ends == best.ends {
-            break;
-        }
-        let fitted = assign(ends, goal, srgb, blend);
-        if fitted.error >= best.error {
-            break;
-        }
-        best = fitted;
-    }
-    best.write(block);
-}
-
-/// A block's end points and what each texel takes of them.
-#[derive(Clone, Copy)]
-struct Candidate {
-    ends: [u16; 2],
-    choices: [u8; TEXELS],
-    error: f32,
-}
-
-impl Candidate {
-    fn write(&self, block: &mut [u8; 8]) {
-        let Candidate { mut ends, choices, .. } = *self;
-        // Four colours take the larger end first; exchanged, the four choices exchange in pairs.
-        let exchange = ends[0] < ends[1];
-        if exchange {
-            ends.swap(0, 1);
-        }
-        let all = ends[0] == ends[1];
-        let mut bits = 0_u32;
-        for (i, choice) in choices.into_iter().enumerate() {
-            let choice = if all { 0 } else { u32::from(choice) ^ u32::from(exchange) };
-            bits |= choice << (2 * i);
-        }
-        block[..2].copy_from_slice(&ends[0].to_le_bytes());
-        block[2..4].copy_from_slice(&ends[1].to_le_bytes());
-        block[4..].copy_from_slice(&bits.to_le_bytes());
-    }
-}
-
-/// The three channels of a 5:6:5 colour as whole numbers.
-#[inline(always)]
-fn channels(end: u16) -> [u16; 3] {
-    [end >> 11, end >> 5 & 63, end & 31]
-}
-
-/// The largest number of each channel.
-const LARGEST: [f32; 3] = [31.0, 63.0, 31.0];
-
-/// Shares of the first end in the four colours.
-const SHARES: [f32; 4] = [1.0, 0.0, 2.0 / 3.0, 1.0 / 3.0];
-
-/// The four values of `s` in a channel, with the 8 bits that decoders round to.
-#[inline(always)]
-fn palette(ends: [u16; 2], channel: usize, srgb: bool) -> [f32; 4] {
-    let (a, b) = (f32::from(channels(ends[0])[channel]), f32::from(channels(ends[1])[channel]));
-    SHARES.map(|share| {
-        let byte = ((b + (a - b) * share) * (255.0 / LARGEST[channel]) + 0.5) as u8;
-        synthesized(byte, srgb)
-    })
-}
-
-/// Lets each texel take the colour that is blended nearest to its target.
-#[inline(always)]
-fn assign(ends: [u16; 2], goal: &BlockGoal, srgb: bool, blend: impl Operator) -> Candidate {
-    let palettes: [[f32; 4]; 3] = [0, 1, 2].map(|channel| palette(ends, channel, srgb));
-    let mut least = [f32::INFINITY; TEXELS];
-    let mut choices = [0_i32; TEXELS];
-    for choice in 0..4 {
-        let mut errors = [0.0; TEXELS];
-        for channel in 0..3 {
-            let s = palettes[channel][choice];
-            let (d, t, gain) = (&goal.d[channel], &goal.t[channel], &goal.gain[channel]);
-            for i in 0..TEXELS {
-                let difference = (blend.blend(s, d[i]) - t[i]) * gain[i];
-                errors[i] += difference * difference;
-            }
-        }
-        for i in 0..TEXELS {
-            let better = errors[i] < least[i];
-            choices[i] = if better { choice as i32 } else { choices[i] };
-            least[i] = if better { errors[i] } else { least[i] };
-        }
-    }
-    Candidate { ends, choices: choices.map(|c| c as u8), error: sum(&least) }
-}
-
-/// The end points nearest to the exact solution, given what each texel takes of them.
-#[inline(always)]
-fn fit(choices: &[u8; TEXELS], goal: &BlockGoal) -> [u16; 2] {
-    let shares = choices.map(|choice| SHARES[usize::from(choice)]);
-    let mut ends = [0_u16; 2];
-    for channel in 0..3 {
-        let (a, b) = least_squares(&shares, &goal.v[channel], &goal.weight[channel]);
-        let bits = [11, 5, 0][channel];
-        for (end, value) in ends.iter_mut().zip([a, b]) {
-            *end |= ((value.clamp(0.0, 1.0) * LARGEST[channel] + 0.5) as u16) << bits;
-        }
-    }
-    ends
-}
-
 /// The two ends whose mixtures, by the shares of the first, are nearest to `v`. Where all shares are alike or nothing has
 /// a weight, both are the mean.
 #[inline(always)]
 fn least_squares(shares: &[f32; TEXELS], v: &[f32; TEXELS], w: &[f32; TEXELS]) -> (f32, f32) {
-    let mut terms = [[0.0; TEXELS]; 5];
+    let (mut aa, mut ab, mut bb) = ([0.0; TEXELS], [0.0; TEXELS], [0.0; TEXELS]);
+    let (mut va, mut vb) = ([0.0; TEXELS], [0.0; TEXELS]);
     for i in 0..TEXELS {
         let (a, b) = (shares[i], 1.0 - shares[i]);
-        for (term, value) in terms.iter_mut().zip([a * a, a * b, b * b, a * v[i], b * v[i]]) {
-            term[i] = w[i] * value;
-        }
+        aa[i] = w[i] * a * a;
+        ab[i] = w[i] * a * b;
+        bb[i] = w[i] * b * b;
+        va[i] = w[i] * a * v[i];
+        vb[i] = w[i] * b * v[i];
     }
-    let [aa, ab, bb, va, vb] = terms.each_ref().map(sum);
+    let (aa, ab, bb, va, vb) = (sum(&aa), sum(&ab), sum(&bb), sum(&va), sum(&vb));
     let determinant = aa * bb - ab * ab;
     if determinant > 1e-4 * (aa + bb) * (aa + bb) {
         ((va * bb - vb * ab) / determinant, (vb * aa - va * ab) / determinant)
@@ -285,68 +337,32 @@ fn least_squares(shares: &[f32; TEXELS], v: &[f32; TEXELS], w: &[f32; TEXELS]) -
     }
 }
 
-/// As [`choose_bc1`], for the one channel and eight values of BC4.
+/// The lower of two arrays, texel by texel.
 #[inline(always)]
-fn choose_bc4(block: &mut [u8; 8], goal: &BlockGoal, blend: impl Operator) {
-    let ends = [block[0], block[1]];
-    // Six values, black and white: for blocks that reach both, and seldom.
-    if ends[0] < ends[1] {
-        return;
+fn lower(a: &[f32; TEXELS], b: &[f32; TEXELS]) -> [f32; TEXELS] {
+    let mut lower = [0.0; TEXELS];
+    for i in 0..TEXELS {
+        lower[i] = if a[i] < b[i] { a[i] } else { b[i] };
     }
-    let mut best = assign_bc4(ends, goal, blend);
-    for _ in 0..ROUNDS {
-        let shares = best.1.map(share_bc4);
-        let (a, b) = least_squares(&shares, &goal.v[0], &goal.weight[0]);
-        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-        let ends = [byte(a.max(b)), byte(a.min(b))];
-        let fitted = assign_bc4(ends, goal, blend);
-        if fitted.2 >= best.2 {
-            break;
-        }
-        best = fitted;
-    }
-    let (ends, choices, _) = best;
-    let mut bits = 0_u64;
-    for (i, choice) in choices.into_iter().enumerate() {
-        let choice = if ends[0] == ends[1] { 0 } else { u64::from(choice) };
-        bits |= choice << (3 * i);
-    }
-    block[..2].copy_from_slice(&ends);
-    block[2..].copy_from_slice(&bits.to_le_bytes()[..6]);
+    lower
 }
 
-/// Share of the first end in a value of BC4.
 #[inline(always)]
-fn share_bc4(choice: u8) -> f32 {
-    match choice {
-        0 => 1.0,
-        1 => 0.0,
-        choice => f32::from(8 - choice) / 7.0,
+fn dot(a: &[f32; TEXELS], b: &[f32; TEXELS]) -> f32 {
+    let mut products = [0.0; TEXELS];
+    for i in 0..TEXELS {
+        products[i] = a[i] * b[i];
     }
-}
-
-/// Lets each texel take the value that is blended nearest to its target; ends, choices and the error.
-#[inline(always)]
-fn assign_bc4(ends: [u8; 2], goal: &BlockGoal, blend: impl Operator) -> ([u8; 2], [u8; TEXELS], f32) {
-    let (a, b) = (f32::from(ends[0]), f32::from(ends[1]));
-    let mut least = [f32::INFINITY; TEXELS];
-    let mut choices = [0_i32; TEXELS];
-    for choice in 0..8_u8 {
-        let s = synthesized((b + (a - b) * share_bc4(choice) + 0.5) as u8, false);
-        for i in 0..TEXELS {
-            let difference = (blend.blend(s, goal.d[0][i]) - goal.t[0][i]) * goal.gain[0][i];
-            let better = difference * difference < least[i];
-            choices[i] = if better { i32::from(choice) } else { choices[i] };
-            least[i] = if better { difference * difference } else { least[i] };
-        }
-    }
-    (ends, choices.map(|c| c as u8), sum(&least))
+    sum(&products)
 }
 
 /// A sum in a fixed order that runs in lanes.
 #[inline(always)]
 fn sum(values: &[f32; TEXELS]) -> f32 {
-    let mut lanes: [f32; 8] = std::array::from_fn(|i| values[i] + values[i + 8]);
+    let mut lanes = [0.0; 8];
+    for i in 0..8 {
+        lanes[i] = values[i] + values[i + 8];
+    }
     for half in [4, 2, 1] {
         for i in 0..half {
             lanes[i] += lanes[i + half];

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::layer::{DetailRows, Layer, RowRoom, Seen, texture_bytes};
 use super::map::{MapKind, Planes, compress, decoded_level, synthesized_level};
 use super::sample::Fetch;
-use super::solve::{Blend, DetailOptions, Solved, Sums, Target, blend, solve, squared_error};
+use super::solve::{Blend, DetailOptions, Solved, Sums, Target, blend, solve, solve_levels, squared_error};
 
 /// Errors of one level by method, each as [`LevelError::error`](super::LevelError::error).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -111,8 +111,19 @@ fn unique_bytes(target: &Target, layers: &[Layer], encoding: Encoding) -> u64 {
         .sum()
 }
 
+/// Blended errors of some levels of `s`, of which no level but these is solved.
+pub(crate) fn solved_errors(
+    target: &Target,
+    layers: &[Layer],
+    options: &DetailOptions,
+    levels: std::ops::Range<usize>,
+) -> Result<Vec<f32>, Error> {
+    let solved = solve_levels(target, layers, options, levels, &|_| {})?;
+    Ok(solved.levels.iter().map(|level| level.error).collect())
+}
+
 /// Errors of a compressed target, level by level.
-fn compressed_errors(target: &Target, texture: &Texture, first: usize) -> Result<Vec<f32>, Error> {
+pub(crate) fn compressed_errors(target: &Target, texture: &Texture, first: usize) -> Result<Vec<f32>, Error> {
     (0..texture.levels.len())
         .map(|level| {
             let decoded = decoded_level(texture, level, target.kind)?;

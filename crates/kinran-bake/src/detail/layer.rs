@@ -1,10 +1,8 @@
 //! Tiles, and the layers they are laid in.
 
-use std::f32::consts::TAU;
-
 use glam::{Mat2, Vec2, Vec3, vec2, vec3};
 use kinran_image::{Encoding, Error, Image, Texture, full_level_count};
-use kinran_scene::Wrap;
+use kinran_scene::{LayerTransform, Wrap};
 use kinran_shading::detail::{
     detail_mask, detail_mirror, detail_turn_aniso, detail_turn_normal, detail_uv, hsv_shift,
 };
@@ -136,43 +134,6 @@ pub(crate) enum Seen {
     Decoded,
 }
 
-/// Where a tile lies on the mesh: `KHR_texture_transform`'s `uv' = translation * rotation * scale * uv`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LayerTransform {
-    /// How often the tile repeats over the unit square, along u and v.
-    pub scale: Vec2,
-    /// Radians.
-    pub rotation: f32,
-    /// In tiles.
-    pub offset: Vec2,
-    /// Every other tile is mirrored.
-    pub mirror: bool,
-}
-
-impl Default for LayerTransform {
-    fn default() -> Self {
-        LayerTransform { scale: Vec2::ONE, rotation: 0.0, offset: Vec2::ZERO, mirror: false }
-    }
-}
-
-impl LayerTransform {
-    /// The matrix that [`detail_uv`] takes.
-    pub fn matrix(&self) -> Mat2 {
-        let r = self.cos_sin();
-        Mat2::from_cols(vec2(r.x, -r.y) * self.scale.x, vec2(r.y, r.x) * self.scale.y)
-    }
-
-    /// Cosine and sine of the rotation, which [`detail_turn_normal`] takes; quarter turns are exact.
-    pub fn cos_sin(&self) -> Vec2 {
-        let quarters = self.rotation / (0.25 * TAU);
-        if (quarters - quarters.round()).abs() < 1e-6 {
-            return [vec2(1.0, 0.0), vec2(0.0, 1.0), vec2(-1.0, 0.0), vec2(0.0, -1.0)]
-                [(quarters.round() as i64).rem_euclid(4) as usize];
-        }
-        vec2(libm::cosf(self.rotation), libm::sinf(self.rotation))
-    }
-}
-
 /// Where a layer is seen: one channel of a texture over the mesh's own UVs.
 #[derive(Clone, Copy, Debug)]
 pub struct Mask<'a> {
@@ -195,12 +156,21 @@ pub struct Layer<'a> {
     pub hsv: Vec3,
     /// How much of it is seen over the layers before. The first layer has none, all others must.
     pub mask: Option<Mask<'a>>,
+    /// Multiplies the mask, 0 to 1. Under the first layer lies what asks for nothing: 1/2, and for normals z. Aniso maps
+    /// have an opacity of their own, so that this one is 1 there.
+    pub opacity: f32,
 }
 
 impl<'a> Layer<'a> {
     /// A tile once over the unit square, as it is.
     pub fn new(tile: &'a Tile) -> Self {
-        Layer { tile, transform: LayerTransform::default(), hsv: vec3(0.0, 1.0, 1.0), mask: None }
+        Layer {
+            tile,
+            transform: LayerTransform::default(),
+            hsv: vec3(0.0, 1.0, 1.0),
+            mask: None,
+            opacity: 1.0,
+        }
     }
 }
 
@@ -226,6 +196,14 @@ pub(crate) fn check_layers(layers: &[Layer], kind: MapKind) -> Result<(), Error>
         }
         if !(layer.hsv.is_finite() && layer.hsv.y >= 0.0 && layer.hsv.z >= 0.0) {
             return fail(format!("{name}: HSV factors must be finite and not negative"));
+        }
+        if !(0.0..=1.0).contains(&layer.opacity) {
+            return fail(format!("{name}: the opacity is a number from 0 to 1, got {}", layer.opacity));
+        }
+        if kind == MapKind::Aniso && layer.opacity != 1.0 {
+            return fail(format!(
+                "{name}: over an aniso map all layers have one opacity, the map's own alpha"
+            ));
         }
         match (&layer.mask, i) {
             (Some(_), 0) => {
@@ -299,16 +277,25 @@ impl<'a> DetailRows<'a> {
             let [r0, r1, r2] = row.each_mut().map(Vec::as_mut_slice);
             layer.fetch.row(y, &mut [r0, r1, r2][..self.kind.channels()]);
             self.transform_row(layer, y, row);
-            let Some((fetch, channel, contrast)) = &layer.mask else { continue };
+            let opacity = layer.layer.opacity;
+            let Some((fetch, channel, contrast)) = &layer.mask else {
+                if opacity < 1.0 {
+                    let neutral = if self.kind == MapKind::Normal { [0.0, 0.0, 1.0] } else { [0.5; 3] };
+                    for (row, neutral) in row.iter_mut().zip(neutral) {
+                        row.iter_mut().for_each(|v| *v = neutral + (*v - neutral) * opacity);
+                    }
+                }
+                continue;
+            };
             let [m0, m1, m2, m3] = room.mask.each_mut().map(Vec::as_mut_slice);
             fetch.row(y, &mut [m0, m1, m2, m3][..=*channel]);
             for (out, layer) in out.iter_mut().zip(&room.layer) {
                 for ((o, l), m) in out.iter_mut().zip(layer).zip(&room.mask[*channel]) {
-                    *o += (l - *o) * detail_mask(*m, *contrast);
+                    *o += (l - *o) * (detail_mask(*m, *contrast) * opacity);
                 }
             }
         }
-        if self.kind == MapKind::Normal && self.layers.len() > 1 {
+        if self.kind == MapKind::Normal && (self.layers.len() > 1 || self.layers[0].layer.opacity < 1.0) {
             map_row(out, |n, _| n.normalize_or(Vec3::Z));
         }
     }

@@ -1,7 +1,9 @@
 //! The solver: every texel's `s`, compressed, and how far the blended result is from the target.
 
 use glam::{Vec3, Vec4, vec3};
-use kinran_image::{Channels, Encoding, Error, Format, Image, Level, Texture, Transfer, decode, encode};
+use kinran_image::{
+    Channels, Encoding, Error, Format, Image, Level, Pixels, Texture, Transfer, decode, encode,
+};
 use kinran_shading::detail::{
     detail_from_texel, detail_over, detail_over_inverse, overlay, overlay_color, overlay_inverse,
     overlay_slope, rnm, rnm_inverse, smooth_overlay, smooth_overlay_color, smooth_overlay_inverse,
@@ -11,10 +13,12 @@ use kinran_shading::normal_from_xy;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::choose::{ChooseBand, can_choose};
+use super::choose::{ChooseBand, Stored, can_choose, makes_its_own};
 use super::code::{byte_from_linear, code_from_linear, linear_from_byte};
 use super::layer::{DetailRows, Layer, RowRoom, Seen, check_layers};
-use super::map::{MapKind, Planes, for_each_row, mip_chain, planes_of_image, synthesized_level, texture};
+use super::map::{
+    MapKind, Planes, bytes_of_planes, for_each_row, mip_chain, planes_of_image, synthesized_level, texture,
+};
 
 /// How colour and data are blended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -40,6 +44,25 @@ pub(crate) struct Smooth;
 /// Overlay as it is.
 #[derive(Clone, Copy)]
 pub(crate) struct Plain;
+
+/// Alpha blending with an opacity.
+#[derive(Clone, Copy)]
+pub(crate) struct Over(pub(crate) f32);
+
+impl Operator for Over {
+    #[inline(always)]
+    fn blend(self, s: f32, d: f32) -> f32 {
+        s + (d - s) * self.0
+    }
+    #[inline(always)]
+    fn inverse(self, t: f32, d: f32) -> f32 {
+        if self.0 < 1.0 { (d + (t - d) / (1.0 - self.0)).clamp(0.0, 1.0) } else { t }
+    }
+    #[inline(always)]
+    fn slope(self, _: f32, _: f32) -> f32 {
+        1.0 - self.0
+    }
+}
 
 impl Operator for Smooth {
     #[inline(always)]
@@ -136,6 +159,22 @@ impl Target {
         Ok(Target { kind, grey, alpha, levels })
     }
 
+    /// The finest level as an image of 8 bits: as it was authored, but for its bits and for normals that pointed down.
+    ///
+    /// # Errors
+    /// None that a target can cause.
+    pub fn image(&self) -> Result<Image, Error> {
+        let finest = &self.levels[0];
+        let rgba8 = bytes_of_planes(finest, self.kind);
+        let (channels, kept) = match (self.grey, self.alpha) {
+            (true, false) => (Channels::R, 1),
+            (_, true) => (Channels::Rgba, 4),
+            (false, false) => (Channels::Rgb, 3),
+        };
+        let bytes = rgba8.chunks_exact(4).flat_map(|texel| &texel[..kept]).copied().collect();
+        Image::new(finest.width, finest.height, channels, Pixels::U8(bytes))
+    }
+
     /// Channels of which errors are measured.
     fn measured(&self) -> usize {
         if self.grey { 1 } else { 3 }
@@ -204,6 +243,17 @@ pub fn solve(
     options: &DetailOptions,
     progress: &(impl Fn(u64) + Sync),
 ) -> Result<Solved, Error> {
+    solve_levels(target, layers, options, options.first_level..target.levels.len(), progress)
+}
+
+/// Some of the levels.
+pub(crate) fn solve_levels(
+    target: &Target,
+    layers: &[Layer],
+    options: &DetailOptions,
+    range: std::ops::Range<usize>,
+    progress: &(impl Fn(u64) + Sync),
+) -> Result<Solved, Error> {
     check_layers(layers, target.kind)?;
     target.check_format(options.encoding.format)?;
     if !(0.0..=1.0).contains(&options.aniso_alpha) {
@@ -223,7 +273,7 @@ pub fn solve(
     let transfer = better_transfer(target, layers, options)?;
     let mut levels = Vec::new();
     let mut errors = Vec::new();
-    for level in options.first_level..target.levels.len() {
+    for level in range {
         let compensated = options.compensate && level > options.first_level;
         let (data, error) = solve_level(target, layers, options, level, (compensated, transfer), progress)?;
         let (width, height) = (target.levels[level].width, target.levels[level].height);
@@ -347,8 +397,14 @@ impl Band<'_> {
             let against = if authored.is_some() { &before[i] } else { &seen[i] };
             self.solve_row(std::array::from_fn(|c| self.planes.row(c, y)), against, out);
         }
-        let mut blocks = encode(self.options.encoding, &rgba8, width as u32, self.rows as u32)?;
-        if self.options.choose && can_choose(self.options.encoding.format, self.target.kind) {
+        let format = self.options.encoding.format;
+        let chosen = self.options.choose && !self.target.alpha && can_choose(format, self.target.kind);
+        let mut blocks = if chosen && makes_its_own(format) {
+            vec![0; format.level_bytes(width as u32, self.rows as u32)]
+        } else {
+            encode(self.options.encoding, &rgba8, width as u32, self.rows as u32)?
+        };
+        if chosen {
             let rows = self.y0..self.y0 + self.rows;
             pulp::Arch::new().dispatch(ChooseBand {
                 width,
@@ -356,8 +412,13 @@ impl Band<'_> {
                 detail: if authored.is_some() { &before } else { &seen },
                 kind: self.target.kind,
                 blend: self.options.blend,
-                srgb: self.srgb,
-                format: self.options.encoding.format,
+                alpha: self.options.aniso_alpha,
+                stored: match self.target.kind {
+                    MapKind::Aniso => Stored::Plain,
+                    _ if self.srgb => Stored::Srgb,
+                    _ => Stored::Linear,
+                },
+                format,
                 blocks: &mut blocks,
             });
         }
@@ -569,11 +630,20 @@ fn overlay_rows(
         let mut texels = [0_u32; RUN];
         for channel in 0..3 {
             let (t, d) = (run_of(target[channel], x0), run_of(&detail[channel], x0));
+            let mut stored = [0.0; RUN];
             for i in 0..RUN {
-                let texel = operator.inverse(t[i], d[i]) * 254.0 + 1.0;
-                texels[i] |=
-                    if srgb { u32::from(byte_from_linear(texel * (1.0 / 255.0))) } else { rounded(texel) }
-                        << (8 * channel);
+                stored[i] = operator.inverse(t[i], d[i]) * 254.0 + 1.0;
+            }
+            // Apart from the solution: codes are looked up, which does not run in lanes.
+            if srgb {
+                for i in 0..RUN {
+                    let code = byte_from_linear(stored[i] * (1.0 / 255.0));
+                    texels[i] |= u32::from(code) << (8 * channel);
+                }
+            } else {
+                for i in 0..RUN {
+                    texels[i] |= rounded(stored[i]) << (8 * channel);
+                }
             }
         }
         let alpha = run_of(target[3], x0);

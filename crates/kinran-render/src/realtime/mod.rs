@@ -5,6 +5,7 @@
 //! [`reference`](mod@crate::reference)'s; what differs is light from all around (spherical harmonics and a filtered
 //! probe instead of samples of the environment) and shadows (a map of one directional light instead of rays).
 
+mod detail;
 mod device;
 mod fuzz;
 mod probe;
@@ -104,6 +105,7 @@ pub(crate) struct Layouts {
     frame: wgpu::BindGroupLayout,
     shadow: wgpu::BindGroupLayout,
     material: wgpu::BindGroupLayout,
+    detail: wgpu::BindGroupLayout,
     g_buffer: wgpu::BindGroupLayout,
     accumulate: wgpu::BindGroupLayout,
     show: wgpu::BindGroupLayout,
@@ -113,15 +115,37 @@ pub(crate) struct Layouts {
 /// with fibres and skin.
 struct Pipelines {
     shadow: wgpu::RenderPipeline,
-    cutout: wgpu::RenderPipeline,
-    fill: [wgpu::RenderPipeline; 2],
     light: wgpu::RenderPipeline,
-    opaque: [[wgpu::RenderPipeline; 2]; 2],
     sky: wgpu::RenderPipeline,
-    transmittance: [wgpu::RenderPipeline; 2],
-    blended: [wgpu::RenderPipeline; 2],
+    /// Of materials with their own maps, and of those with maps blended from tiles.
+    on_mesh: [MeshPipelines; 2],
     accumulate: wgpu::RenderPipeline,
     show: wgpu::RenderPipeline,
+}
+
+/// Pipelines of passes that know a material.
+struct MeshPipelines {
+    cutout: wgpu::RenderPipeline,
+    fill: [wgpu::RenderPipeline; 2],
+    /// Without and with fibres and skin.
+    opaque: [[wgpu::RenderPipeline; 2]; 2],
+    transmittance: [wgpu::RenderPipeline; 2],
+    blended: [wgpu::RenderPipeline; 2],
+}
+
+impl Pipelines {
+    /// Those that draw a material.
+    fn of(&self, material: &upload::Material) -> &MeshPipelines {
+        &self.on_mesh[usize::from(material.detail.is_some())]
+    }
+}
+
+/// Sets the textures and factors of a material.
+fn set_material(pass: &mut wgpu::RenderPass, material: &upload::Material) {
+    pass.set_bind_group(1, &material.bind_group, &[]);
+    if let Some(detail) = &material.detail {
+        pass.set_bind_group(2, &detail.bind_group, &[]);
+    }
 }
 
 /// The renderer.
@@ -264,10 +288,9 @@ impl Realtime {
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
         for draw in draws(Path::Forward) {
             let material = &scene.materials[draw.material];
-            pass.set_pipeline(
-                &self.pipelines.opaque[usize::from(material.layered)][usize::from(material.double_sided)],
-            );
-            pass.set_bind_group(1, &material.bind_group, &[]);
+            let opaque = &self.pipelines.of(material).opaque[usize::from(material.layered)];
+            pass.set_pipeline(&opaque[usize::from(material.double_sided)]);
+            set_material(&mut pass, material);
             pass.draw_indexed(draw.indices.clone(), 0, 0..1);
         }
         pass.set_pipeline(&self.pipelines.sky);
@@ -277,8 +300,9 @@ impl Realtime {
         blended.sort_by(|a, b| b.middle.distance(eye).total_cmp(&a.middle.distance(eye)));
         for draw in blended {
             let material = &scene.materials[draw.material];
-            pass.set_bind_group(1, &material.bind_group, &[]);
-            for pipelines in [&self.pipelines.transmittance, &self.pipelines.blended] {
+            set_material(&mut pass, material);
+            let pipelines = self.pipelines.of(material);
+            for pipelines in [&pipelines.transmittance, &pipelines.blended] {
                 pass.set_pipeline(&pipelines[usize::from(material.double_sided)]);
                 pass.draw_indexed(draw.indices.clone(), 0, 0..1);
             }
@@ -481,8 +505,8 @@ impl Realtime {
         for draw in scene.draws.iter().filter(|draw| scene.materials[draw.material].path != Path::Blended) {
             let material = &scene.materials[draw.material];
             if material.cutout {
-                pass.set_pipeline(&self.pipelines.cutout);
-                pass.set_bind_group(1, &material.bind_group, &[]);
+                pass.set_pipeline(&self.pipelines.of(material).cutout);
+                set_material(&mut pass, material);
             } else {
                 pass.set_pipeline(&self.pipelines.shadow);
             }
@@ -505,8 +529,8 @@ impl Realtime {
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
         for draw in draws {
             let material = &scene.materials[draw.material];
-            pass.set_pipeline(&self.pipelines.fill[usize::from(material.double_sided)]);
-            pass.set_bind_group(1, &material.bind_group, &[]);
+            pass.set_pipeline(&self.pipelines.of(material).fill[usize::from(material.double_sided)]);
+            set_material(&mut pass, material);
             pass.draw_indexed(draw.indices.clone(), 0, 0..1);
         }
     }
@@ -623,6 +647,9 @@ impl Layouts {
         material.extend([filtered; 3]);
         material.extend([smooth; 3]);
         material.extend([filtered; 3]);
+        let mut detail = vec![uniform];
+        detail.extend([filtered; detail::TEXTURES]);
+        detail.extend([smooth; detail::SAMPLERS]);
         Layouts {
             frame: layout(&[
                 uniform,
@@ -635,6 +662,7 @@ impl Layouts {
             ]),
             shadow: layout(&[uniform]),
             material: layout(&material),
+            detail: layout(&detail),
             g_buffer: layout(&[raw, texture(T::Uint), raw, texture(T::Depth)]),
             accumulate: layout(&[raw, raw]),
             show: layout(&[raw]),
@@ -668,29 +696,7 @@ impl Pipelines {
     ) -> Result<Self, Error> {
         use wgpu::CompareFunction::{Less, LessEqual};
         source.check()?;
-        let mesh = [
-            "frame.wgsl",
-            "fuzz.wgsl",
-            "lighting.wgsl",
-            "surface.wgsl",
-            "fuzz_surface.wgsl",
-            "channels.wgsl",
-            "skin.wgsl",
-            "forward.wgsl",
-        ];
-        let fill = [
-            "frame.wgsl",
-            "fuzz.wgsl",
-            "lighting.wgsl",
-            "surface.wgsl",
-            "fuzz_surface.wgsl",
-            "octahedral.wgsl",
-            "gbuffer.wgsl",
-        ];
         let light_files = ["frame.wgsl", "fuzz.wgsl", "lighting.wgsl", "octahedral.wgsl", "deferred.wgsl"];
-        let cutout =
-            ["frame.wgsl", "fuzz.wgsl", "lighting.wgsl", "surface.wgsl", "fuzz_surface.wgsl", "cutout.wgsl"];
-        let material = [&layouts.frame, &layouts.material];
         let everywhere = Pass {
             files: &[],
             groups: &[],
@@ -703,38 +709,11 @@ impl Pipelines {
             cull: false,
             constants: &[],
         };
-        let component = |src_factor, dst_factor| wgpu::BlendComponent {
-            src_factor,
-            dst_factor,
-            operation: wgpu::BlendOperation::Add,
-        };
-        let blend = |color| wgpu::BlendState { color, alpha: wgpu::BlendComponent::OVER };
-        let add = blend(component(wgpu::BlendFactor::One, wgpu::BlendFactor::One));
-        let multiply = blend(component(wgpu::BlendFactor::Zero, wgpu::BlendFactor::Src));
-        let on_mesh =
-            |files, fragment, targets, blend, depth, constants| -> Result<[wgpu::RenderPipeline; 2], Error> {
-                let pass = |cull| {
-                    pipeline(
-                        device,
-                        source,
-                        &Pass {
-                            files,
-                            groups: &material,
-                            vertex: "vertex",
-                            attributes: 6,
-                            fragment: Some(fragment),
-                            targets,
-                            blend,
-                            depth: Some(depth),
-                            cull,
-                            constants,
-                        },
-                    )
-                };
-                Ok([pass(true)?, pass(false)?])
-            };
-        let [base, normal, factors] = G_BUFFER;
         Ok(Self {
+            on_mesh: [
+                MeshPipelines::new(device, layouts, source, false)?,
+                MeshPipelines::new(device, layouts, source, true)?,
+            ],
             shadow: pipeline(
                 device,
                 source,
@@ -747,20 +726,6 @@ impl Pipelines {
                     ..everywhere
                 },
             )?,
-            cutout: pipeline(
-                device,
-                source,
-                &Pass {
-                    files: &cutout,
-                    groups: &[&layouts.shadow, &layouts.material],
-                    vertex: "cutout_depth",
-                    attributes: 6,
-                    fragment: Some("cutout"),
-                    depth: Some((Less, true)),
-                    ..everywhere
-                },
-            )?,
-            fill: on_mesh(&fill[..], "fill", &[base, normal, factors, HDR][..], None, (Less, true), &[][..])?,
             light: pipeline(
                 device,
                 source,
@@ -769,14 +734,10 @@ impl Pipelines {
                     groups: &[&layouts.frame, &layouts.g_buffer],
                     fragment: Some("light"),
                     targets: &[HDR],
-                    blend: Some(add),
+                    blend: Some(added()),
                     ..everywhere
                 },
             )?,
-            opaque: [
-                on_mesh(&mesh[..], "opaque", &[HDR][..], None, (Less, true), &[("LAYERED", 0.0)][..])?,
-                on_mesh(&mesh[..], "opaque", &[HDR][..], None, (Less, true), &[][..])?,
-            ],
             sky: pipeline(
                 device,
                 source,
@@ -790,15 +751,6 @@ impl Pipelines {
                     ..everywhere
                 },
             )?,
-            transmittance: on_mesh(
-                &mesh[..],
-                "transmittance",
-                &[HDR][..],
-                Some(multiply),
-                (Less, false),
-                &[][..],
-            )?,
-            blended: on_mesh(&mesh[..], "blended", &[HDR][..], Some(add), (Less, false), &[][..])?,
             accumulate: pipeline(
                 device,
                 source,
@@ -821,6 +773,86 @@ impl Pipelines {
                     ..everywhere
                 },
             )?,
+        })
+    }
+}
+
+/// Colour that is multiplied and added so; alpha goes over.
+fn blended(src_factor: wgpu::BlendFactor, dst_factor: wgpu::BlendFactor) -> wgpu::BlendState {
+    let color = wgpu::BlendComponent { src_factor, dst_factor, operation: wgpu::BlendOperation::Add };
+    wgpu::BlendState { color, alpha: wgpu::BlendComponent::OVER }
+}
+
+/// On top of what is there.
+fn added() -> wgpu::BlendState {
+    blended(wgpu::BlendFactor::One, wgpu::BlendFactor::One)
+}
+
+impl MeshPipelines {
+    /// For materials whose maps are blended from tiles, or their own.
+    fn new(
+        device: &wgpu::Device,
+        layouts: &Layouts,
+        source: &ShaderSource,
+        detail: bool,
+    ) -> Result<Self, Error> {
+        use wgpu::CompareFunction::Less;
+        let maps = if detail { "detail.wgsl" } else { "no_detail.wgsl" };
+        let surface = ["frame.wgsl", "fuzz.wgsl", "lighting.wgsl", "surface.wgsl", maps, "fuzz_surface.wgsl"];
+        let lit = [&surface[..], &["channels.wgsl", "skin.wgsl", "forward.wgsl"]].concat();
+        let fill = [&surface[..], &["octahedral.wgsl", "gbuffer.wgsl"]].concat();
+        let cutout = [&surface[..], &["cutout.wgsl"]].concat();
+        let groups = |first| {
+            let mut groups = vec![first, &layouts.material];
+            groups.extend(detail.then_some(&layouts.detail));
+            groups
+        };
+        let material = groups(&layouts.frame);
+        let on_mesh =
+            |files: &[&str], fragment, targets: &[wgpu::TextureFormat], blend, write, constants: &[_]| {
+                let pass = |cull| {
+                    let pass = Pass {
+                        files,
+                        groups: &material,
+                        vertex: "vertex",
+                        attributes: 6,
+                        fragment: Some(fragment),
+                        targets,
+                        blend,
+                        depth: Some((Less, write)),
+                        cull,
+                        constants,
+                    };
+                    pipeline(device, source, &pass)
+                };
+                Ok([pass(true)?, pass(false)?])
+            };
+        let multiplied = blended(wgpu::BlendFactor::Zero, wgpu::BlendFactor::Src);
+        let [base, normal, factors] = G_BUFFER;
+        Ok(Self {
+            cutout: pipeline(
+                device,
+                source,
+                &Pass {
+                    files: &cutout,
+                    groups: &groups(&layouts.shadow),
+                    vertex: "cutout_depth",
+                    attributes: 6,
+                    fragment: Some("cutout"),
+                    targets: &[],
+                    blend: None,
+                    depth: Some((Less, true)),
+                    cull: false,
+                    constants: &[],
+                },
+            )?,
+            fill: on_mesh(&fill, "fill", &[base, normal, factors, HDR], None, true, &[])?,
+            opaque: [
+                on_mesh(&lit, "opaque", &[HDR], None, true, &[("LAYERED", 0.0)])?,
+                on_mesh(&lit, "opaque", &[HDR], None, true, &[])?,
+            ],
+            transmittance: on_mesh(&lit, "transmittance", &[HDR], Some(multiplied), false, &[])?,
+            blended: on_mesh(&lit, "blended", &[HDR], Some(added()), false, &[])?,
         })
     }
 }

@@ -8,12 +8,14 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use crate::Error;
 
 /// This folder's files.
-const FILES: [(&str, &str); 15] = [
+const FILES: [(&str, &str); 17] = [
     ("frame.wgsl", include_str!("frame.wgsl")),
     ("fuzz.wgsl", include_str!("fuzz.wgsl")),
     ("lighting.wgsl", include_str!("lighting.wgsl")),
     ("surface.wgsl", include_str!("surface.wgsl")),
     ("fuzz_surface.wgsl", include_str!("fuzz_surface.wgsl")),
+    ("detail.wgsl", include_str!("detail.wgsl")),
+    ("no_detail.wgsl", include_str!("no_detail.wgsl")),
     ("channels.wgsl", include_str!("channels.wgsl")),
     ("skin.wgsl", include_str!("skin.wgsl")),
     ("forward.wgsl", include_str!("forward.wgsl")),
@@ -30,7 +32,7 @@ const FILES: [(&str, &str); 15] = [
 const TONEMAP: (&str, &str) = ("tonemap.wgsl", include_str!("tonemap.wgsl"));
 
 /// Modules of the library that the passes use.
-const LIBRARY: [&str; 10] = [
+const LIBRARY: [&str; 15] = [
     "ggx",
     "aniso",
     "multiscatter",
@@ -41,6 +43,11 @@ const LIBRARY: [&str; 10] = [
     "fuzz_deferred",
     "skin_curvature",
     "skin_lighting",
+    "detail_hsv",
+    "detail_layer",
+    "detail_normal",
+    "detail_over",
+    "detail_overlay",
 ];
 
 /// Where shader text comes from.

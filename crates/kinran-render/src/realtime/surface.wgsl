@@ -84,27 +84,30 @@ fn uv(in: Varying, texture: u32) -> vec2f {
 }
 
 fn base_color_at(in: Varying) -> vec4f {
-    return material.base_color * in.color * textureSample(base_color_map, base_color_sampler, uv(in, 2u));
+    let own = textureSample(base_color_map, base_color_sampler, uv(in, 2u));
+    return material.base_color * in.color * detail_base_color(in, own);
 }
 
 fn surface_at(in: Varying, front: bool) -> Surface {
     var surface: Surface;
     let view = normalize(frame.camera.xyz - in.position);
     let base = base_color_at(in);
-    let metallic_roughness = textureSample(metallic_roughness_map, metallic_roughness_sampler, uv(in, 3u));
-    let occlusion = textureSample(occlusion_map, occlusion_sampler, uv(in, 4u)).r;
+    let own_data = textureSample(metallic_roughness_map, metallic_roughness_sampler, uv(in, 3u));
+    let own_occlusion = textureSample(occlusion_map, occlusion_sampler, uv(in, 4u)).r;
+    let data = detail_data(in, vec3f(own_occlusion, own_data.g, own_data.b));
     let emissive = textureSample(emissive_map, emissive_sampler, uv(in, 5u)).rgb;
     let translucency = textureSample(translucency_map, translucency_sampler, uv(in, 6u)).a;
     let translucent_color = textureSample(translucent_color_map, translucent_color_sampler, uv(in, 7u)).rgb;
     let normal_xy = textureSample(normal_map, normal_sampler, uv(in, 0u)).rg * 2.0 - 1.0;
-    let tilted = normal_xy * material.adjustment.w;
     let texel = textureSample(aniso_map, aniso_sampler, uv(in, 1u)).rgb;
 
     // Normal and roughness in the tangent frame of the mesh, which is not normalised: MikkTSpace.
-    let roughness = saturate(material.factors.y * metallic_roughness.g);
+    let roughness = saturate(material.factors.y * data.y);
     let alpha = alpha_from_roughness(roughness);
     let mapped = material.flags.x > 0u;
-    let n = select(vec3f(0.0, 0.0, 1.0), normal_from_xy(tilted.x, tilted.y), mapped);
+    let own_normal = select(vec3f(0.0, 0.0, 1.0), normal_from_xy(normal_xy.x, normal_xy.y), mapped);
+    let tilted = detail_normal(in, own_normal).xy * material.adjustment.w;
+    let n = normal_from_xy(tilted.x, tilted.y);
     var encoded = select(vec3f(alpha, 0.5, alpha), texel, mapped);
     if material.flags.x == 2u {
         let alphas = alphas_from_khr_anisotropy(roughness, material.khr.x * texel.b);
@@ -113,6 +116,7 @@ fn surface_at(in: Varying, front: bool) -> Surface {
         let direction = vec2f(turn.x * held.x - turn.y * held.y, turn.y * held.x + turn.x * held.y);
         encoded = aniso_encode(aniso_from_alphas(alphas.x, alphas.y, axis_from_direction(direction, n)));
     }
+    encoded = detail_aniso(in, encoded);
 
     // To world space. Back faces are the same relief seen from behind.
     let side = select(-1.0, 1.0, front);
@@ -141,11 +145,11 @@ fn surface_at(in: Varying, front: bool) -> Surface {
     surface.alpha_t = clamp(mean * stretch, ALPHA_MIN, 1.0);
     surface.alpha_b = clamp(mean / stretch, ALPHA_MIN, 1.0);
     surface.base_color = base.rgb;
-    surface.metallic = saturate(material.factors.x * metallic_roughness.b);
+    surface.metallic = saturate(material.factors.x * data.z);
     surface.transmissive = material.factors.w;
     surface.translucency = saturate(material.translucency.w * translucency);
     surface.translucent_color = material.translucency.rgb * translucent_color;
-    surface.occlusion = 1.0 + material.emissive.w * (occlusion - 1.0);
+    surface.occlusion = 1.0 + material.emissive.w * (data.x - 1.0);
     surface.emitted = material.emissive.rgb * emissive;
     surface.opacity = select(1.0, saturate(base.a), material.flags.y == 2u);
     if material.flags.y == 1u && base.a < material.factors.z {

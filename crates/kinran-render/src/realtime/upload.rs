@@ -10,7 +10,7 @@ use kinran_scene::{AlphaMode, Light, Wrap};
 use rayon::prelude::*;
 use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
 
-use super::{Gpu, Layouts, fuzz, probe};
+use super::{Gpu, Layouts, detail, fuzz, probe};
 use crate::reference::{
     AnisoEncoding, BoundTexture, FLAT, MipTexture, RenderMaterial, RenderScene, SkinCurvature, SkinTable,
     Surroundings, TextureFiltering,
@@ -39,12 +39,19 @@ pub(super) struct Material {
     uniform: wgpu::Buffer,
     fuzz: wgpu::Buffer,
     pub(super) bind_group: wgpu::BindGroup,
+    pub(super) detail: Option<Detail>,
     pub(super) path: Path,
     pub(super) double_sided: bool,
     /// Fibres or skin; see `LAYERED` in surface.wgsl.
     pub(super) layered: bool,
     /// Alpha below a cutoff is a hole.
     pub(super) cutout: bool,
+}
+
+/// Maps blended from tiles.
+pub(super) struct Detail {
+    uniform: wgpu::Buffer,
+    pub(super) bind_group: wgpu::BindGroup,
 }
 
 /// What a person may turn of a material whose roughness and normals are baked, without baking again.
@@ -93,7 +100,7 @@ impl GpuScene {
         self.scene.lights = lights;
     }
 
-    /// Other factors and another fuzz for a material from the next frame on; its textures stay.
+    /// Other factors, another fuzz and other detail for a material from the next frame on; its textures stay.
     pub fn set_material(
         &mut self,
         gpu: &Gpu,
@@ -104,6 +111,9 @@ impl GpuScene {
         let floats = material_floats(material, adjustment, self.scene.geometry.curvature_range());
         gpu.queue.write_buffer(&self.materials[index].uniform, 0, &bytes(&floats));
         gpu.queue.write_buffer(&self.materials[index].fuzz, 0, &bytes(&fuzz::floats(material)));
+        if let (Some(there), Some(detail)) = (&self.materials[index].detail, &material.detail) {
+            gpu.queue.write_buffer(&there.uniform, 0, &bytes(&detail::floats(detail)));
+        }
         self.materials[index].path = path(material);
         self.materials[index].layered = is_layered(material);
     }
@@ -426,10 +436,29 @@ fn material(
         layout: &layouts.material,
         entries: &entries,
     });
+    let detail = m.detail.as_ref().map(|detail| {
+        let uniform = buffer(&detail::floats(detail));
+        let views = detail::textures(detail, &white.texture).map(|texture| textures.view(texture));
+        let samplers = detail::wraps(detail).map(|wrap| textures.sampler([wrap; 2]));
+        let resources = std::iter::once(uniform.as_entire_binding())
+            .chain(views.iter().map(wgpu::BindingResource::TextureView))
+            .chain(samplers.iter().map(wgpu::BindingResource::Sampler));
+        let entries: Vec<_> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        let bind_group = textures.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &layouts.detail,
+            entries: &entries,
+        });
+        Detail { uniform, bind_group }
+    });
     Material {
         uniform,
         fuzz,
         bind_group,
+        detail,
         path: path(m),
         double_sided: m.double_sided,
         layered: is_layered(m),
@@ -456,7 +485,12 @@ fn path(m: &RenderMaterial) -> Path {
     });
     if m.alpha_mode == AlphaMode::Blend || m.transmissive {
         Path::Blended
-    } else if m.surface.is_some() || own_color || m.skin.is_some() || fuzz::is_forward(m) {
+    } else if m.surface.is_some()
+        || own_color
+        || m.skin.is_some()
+        || fuzz::is_forward(m)
+        || detail::is_forward(&m.detail)
+    {
         Path::Forward
     } else {
         Path::Deferred

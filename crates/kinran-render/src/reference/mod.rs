@@ -8,6 +8,7 @@
 pub(crate) mod albedo;
 mod bvh;
 mod camera;
+mod detail;
 mod fuzz;
 mod geometry;
 mod light;
@@ -20,6 +21,7 @@ mod texture;
 
 pub use bvh::{Bvh, Hit};
 pub use camera::{CameraRay, PictureCamera, frame_box, look_at};
+pub use detail::{DetailShown, RenderDetail, RenderDetailLayer};
 pub use fuzz::{FUZZ_TILTS, FuzzCoefficients, RenderFuzz};
 pub use geometry::{FLAT, Geometry, MAX_TRIANGLES, SurfacePoint};
 pub use render::{Background, Film, Settings, TextureFiltering, render};

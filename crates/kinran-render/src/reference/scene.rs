@@ -1,10 +1,15 @@
 //! A scene as the renderer needs it.
 
-use super::{FUZZ_TILTS, FuzzCoefficients, Geometry, MipTexture, RenderFuzz, RenderSkin};
+use super::{
+    FUZZ_TILTS, FuzzCoefficients, Geometry, MipTexture, RenderDetail, RenderDetailLayer, RenderFuzz,
+    RenderSkin,
+};
 use crate::Error;
 use glam::{Mat3, Vec2, Vec3, Vec4};
 use kinran_image::Transfer;
-use kinran_scene::{AlphaMode, Environment, Fuzz, FuzzPhase, Light, Material, Scene, TextureRef};
+use kinran_scene::{
+    AlphaMode, Detail, DetailMap, Environment, Fuzz, FuzzPhase, Light, Material, Scene, TextureRef,
+};
 use kinran_shading::sh::{Sh9, sh_convolve_cosine, sh_evaluate};
 use kinran_shading::skin::lighting::skin_irradiance;
 use std::{collections::HashMap, sync::Arc};
@@ -102,6 +107,8 @@ pub struct RenderMaterial {
     pub transmissive: bool,
     /// Fibres over all that.
     pub fuzz: Option<RenderFuzz>,
+    /// Maps blended from tiles, in the place of those above.
+    pub detail: Option<RenderDetail>,
 }
 
 /// Light from all around and its order-2 irradiance.
@@ -238,7 +245,31 @@ impl TextureLoader<'_> {
         Ok(BoundTexture::new(self.loaded[&key].clone(), place))
     }
 
+    /// Maps blended from tiles.
+    fn detail(&mut self, detail: &Detail) -> Result<RenderDetail, Error> {
+        let mut load = |place: Option<&TextureRef>, transfer| {
+            place.map(|place| self.texture(place, transfer)).transpose()
+        };
+        let mut maps = [const { None }; 4];
+        for (map, place) in maps.iter_mut().zip(&detail.maps) {
+            *map = load(place.as_ref(), Transfer::Linear)?;
+        }
+        let mut layers = Vec::new();
+        for layer in &detail.layers {
+            let mut tiles = [const { None }; 4];
+            for (map, (tile, place)) in DetailMap::ALL.into_iter().zip(tiles.iter_mut().zip(&layer.tiles)) {
+                let color = map == DetailMap::BaseColor;
+                let transfer = if color { Transfer::Srgb } else { Transfer::Linear };
+                *tile = load(place.as_ref(), transfer)?.map(|bound| bound.texture);
+            }
+            let mask = load(layer.mask.as_ref().map(|mask| &mask.texture), Transfer::Linear)?;
+            layers.push(RenderDetailLayer::new(layer, tiles, mask));
+        }
+        Ok(RenderDetail::new(detail.clone(), maps, layers))
+    }
+
     fn material(&mut self, m: &Material, surface: Option<SurfaceTextures>) -> Result<RenderMaterial, Error> {
+        let detail = m.detail.as_ref().map(|detail| self.detail(detail)).transpose()?;
         let mut load = |place: &Option<TextureRef>, transfer| {
             place.as_ref().map(|place| self.texture(place, transfer)).transpose()
         };
@@ -265,6 +296,7 @@ impl TextureLoader<'_> {
             },
             alpha_mode: m.alpha_mode,
             double_sided: m.double_sided,
+            detail,
             fuzz: match &m.fuzz {
                 None => None,
                 Some(fuzz) => {

@@ -14,7 +14,7 @@ use super::{
     skin::SkinPoint,
 };
 use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, Vec4, Vec4Swizzles};
-use kinran_scene::AlphaMode;
+use kinran_scene::{AlphaMode, DetailMap};
 use kinran_shading::{
     alpha_from_roughness, alphas_from_khr_anisotropy, aniso_decode, aniso_encode, aniso_from_alphas,
     axis_from_direction, ggx_aniso_d, ggx_d, m_n, multiscatter_compensation, normal_from_xy, schlick_f,
@@ -80,7 +80,9 @@ pub(crate) fn sample_bound(t: &BoundTexture, point: &SurfacePoint, filtering: Te
 
 /// Base colour and alpha.
 fn base_color(material: &RenderMaterial, point: &SurfacePoint, filtering: TextureFiltering) -> Vec4 {
-    material.base_color_factor * point.color * sample(&material.base_color, point, filtering)
+    let map = material.detail.as_ref().and_then(|detail| detail.at(DetailMap::BaseColor, point, filtering));
+    let map = map.unwrap_or_else(|| sample(&material.base_color, point, filtering));
+    material.base_color_factor * point.color * map
 }
 
 /// How much a surface hides, 0 to 1.
@@ -128,23 +130,31 @@ impl Shading {
         curvature_range: f32,
     ) -> Self {
         let base = base_color(material, point, filtering);
-        let metallic_roughness = sample(&material.metallic_roughness, point, filtering);
-        let metallic = (material.metallic_factor * metallic_roughness.z).clamp(0.0, 1.0);
+        let own = sample(&material.metallic_roughness, point, filtering);
+        let own_occlusion = sample(&material.occlusion, point, filtering).x;
+        let detail = |map| material.detail.as_ref()?.at(map, point, filtering);
+        let data = detail(DetailMap::Data);
+        let channels = material.detail.as_ref().map_or([None; 3], |detail| detail.detail.channels);
+        let of_data = |channel: Option<usize>, own: f32| channel.zip(data).map_or(own, |(c, data)| data[c]);
+        let occlusion = of_data(channels[0], own_occlusion);
+        let metallic = (material.metallic_factor * of_data(channels[2], own.z)).clamp(0.0, 1.0);
 
         // Normal and roughness, in the tangent frame of the mesh.
-        let roughness = (material.roughness_factor * metallic_roughness.y).clamp(0.0, 1.0);
+        let roughness = (material.roughness_factor * of_data(channels[1], own.y)).clamp(0.0, 1.0);
+        let blended = detail(DetailMap::Normal).map(|n| n.xyz());
         let (n, texel) = match &material.surface {
             Some(surface) => {
                 let xy = sample_bound(&surface.normal, point, filtering).xy() * 2.0 - 1.0;
-                let n = normal_from_xy(xy.x, xy.y);
+                let n = blended.unwrap_or_else(|| normal_from_xy(xy.x, xy.y));
                 let texel = sample_bound(&surface.aniso, point, filtering).xyz();
                 (n, surface.encoding.texel(texel, roughness, n))
             }
             None => {
                 let alpha = alpha_from_roughness(roughness);
-                (Vec3::Z, Vec3::new(alpha, 0.5, alpha))
+                (blended.unwrap_or(Vec3::Z), Vec3::new(alpha, 0.5, alpha))
             }
         };
+        let texel = detail(DetailMap::Aniso).map_or(texel, |texel| texel.xyz());
 
         // To world space. The mesh's frame may be skewed by interpolation; what comes out is orthonormal.
         let front = if point.geometric_normal.dot(view) < 0.0 { -1.0 } else { 1.0 };
@@ -175,7 +185,6 @@ impl Shading {
         let diffuse = scattered * opaque;
         let fuzz = (material.fuzz.as_ref())
             .and_then(|fuzz| FuzzAt::new(fuzz, point, filtering, to_world, frame, v, diffuse));
-        let occlusion = sample(&material.occlusion, point, filtering).x;
         Shading {
             frame,
             v,

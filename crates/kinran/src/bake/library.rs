@@ -18,8 +18,9 @@ use serde::{Deserialize, Serialize};
 use super::settings::{self, Flags};
 use super::{Args, Report, bake_folder, bake_gltf, file_name};
 use crate::detail::{SolveArgs, solve_target};
+use crate::skin_lut;
 use crate::table::list;
-use crate::{Console, Error};
+use crate::{Console, Error, Progress};
 
 /// Bytes that a cache may hold where nothing says otherwise; chosen by eye: a few hundred 4096² materials.
 pub const CACHE_LIMIT: u64 = 20 << 30;
@@ -41,6 +42,10 @@ pub struct LibraryArgs {
     /// Entries baked at the same time [default: one for each worker thread]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
+
+    /// Removes the files of entries that are gone from the manifest, those that nobody has changed
+    #[arg(long)]
+    pub prune: bool,
 
     /// Where finished work is kept [default: KINRAN_CACHE, else what the manifest says, else the user's
     /// cache folder]
@@ -107,6 +112,10 @@ pub struct LibraryReport {
     pub entries: Vec<EntryReport>,
     /// Entries that the cache let go, to stay below its limit.
     pub evicted: usize,
+    /// Folders, below the output, of entries that are gone from the manifest and whose files stand there still.
+    pub left_over: Vec<PathBuf>,
+    /// Those that `--prune` removed, or with `--dry-run` would remove.
+    pub pruned: Vec<PathBuf>,
 }
 
 impl LibraryReport {
@@ -141,6 +150,16 @@ impl LibraryReport {
             .map(|status| format!("{} {}", self.count(status), status.name()))
             .collect();
         text += &format!("{}; in {}\n", counts.join(", "), self.output.display());
+        let named = |folders: &[PathBuf]| {
+            let names: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
+            names.join(", ")
+        };
+        if !self.left_over.is_empty() {
+            text += &format!("gone from the manifest, --prune removes them: {}\n", named(&self.left_over));
+        }
+        if !self.pruned.is_empty() {
+            text += &format!("removed: {}\n", named(&self.pruned));
+        }
         text
     }
 }
@@ -262,13 +281,16 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
             let cached = library.cache.get(key).is_some();
             entries[*at].status = if cached { Status::WouldRestore } else { Status::WouldBake };
         }
-        let report = LibraryReport { output: library.output, entries, evicted: 0 };
+        let gone = library.gone(&entries);
+        let (left_over, pruned) = if args.library.prune { (Vec::new(), gone) } else { (gone, Vec::new()) };
+        let report = LibraryReport { output: library.output, entries, evicted: 0, left_over, pruned };
         return Ok(Built { report });
     }
 
     // Bake the rest, some at a time. Threads of their own and not tasks of the pool: a thread of the pool that
     // waits for a part of one entry would begin another one meanwhile, and hold both in memory.
-    let stage = console.progress().stage("baking", todo.len() as u64);
+    let bars = console.progress().grouped();
+    let stage = bars.stage("baking", todo.len() as u64);
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<(usize, EntryReport)>> = Mutex::new(Vec::new());
     let threads = args.library.jobs.map_or_else(rayon::current_num_threads, usize::from).min(todo.len());
@@ -277,7 +299,7 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
             scope.spawn(|| {
                 while let Some((at, key, job, flags)) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let mut entry = EntryReport::new(job);
-                    match library.make(job, key, flags, &mut entry) {
+                    match library.make(job, key, flags, &bars, &mut entry) {
                         Ok(status) => entry.status = status,
                         Err(error) => entry.fail(error.to_string()),
                     }
@@ -291,6 +313,9 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
     for (at, entry) in done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
         entries[at] = entry;
     }
+    let gone = library.gone(&entries);
+    let (left_over, pruned) = if args.library.prune { (Vec::new(), gone) } else { (gone, Vec::new()) };
+    library.prune(&pruned, console)?;
     library.save()?;
     let limit = manifest.cache_limit.unwrap_or(CACHE_LIMIT);
     let evicted = if todo.is_empty() { 0 } else { library.cache.evict(limit)?.0 };
@@ -309,7 +334,7 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
             failures.insert(entry.folder.clone(), (key, error.clone()));
         }
     }
-    Ok(Built { report: LibraryReport { output: library.output, entries, evicted } })
+    Ok(Built { report: LibraryReport { output: library.output, entries, evicted, left_over, pruned } })
 }
 
 impl EntryReport {
@@ -396,21 +421,31 @@ impl Library {
             }
             (_, Flags::Detail(flags)) => {
                 let layers = flags.layer.iter().flat_map(|layer| [Some(&layer.tile), layer.mask.as_ref()]);
-                for path in std::iter::once(&job.input).chain(layers.flatten()) {
+                let model = flags.model.as_ref().map(|model| self.model_files(model)).transpose()?;
+                let model = model.unwrap_or_default();
+                for path in std::iter::once(&job.input).chain(layers.flatten()).chain(&model) {
+                    parts.push(format!("{} {}", file_name(path), self.stamps.hash(path)?));
+                }
+            }
+            (_, Flags::Skin(flags)) => {
+                if let Some(path) = &flags.profile {
                     parts.push(format!("{} {}", file_name(path), self.stamps.hash(path)?));
                 }
             }
             (_, Flags::Bake(_)) => {
-                parts.push(format!("{} {}", file_name(&job.input), self.stamps.hash(&job.input)?));
-                let files = self.stamps.refers_to(&job.input, || -> Result<_, Error> {
-                    Ok(Document::open(&job.input)?.files())
-                })?;
-                for path in files {
+                for path in self.model_files(&job.input)? {
                     parts.push(format!("{} {}", file_name(&path), self.stamps.hash(&path)?));
                 }
             }
         }
         Ok(Key::new(parts.iter().map(String::as_bytes)))
+    }
+
+    /// A model and the files that it refers to.
+    fn model_files(&self, model: &Path) -> Result<Vec<PathBuf>, Error> {
+        let files =
+            self.stamps.refers_to(model, || -> Result<_, Error> { Ok(Document::open(model)?.files()) })?;
+        Ok(std::iter::once(model.to_path_buf()).chain(files).collect())
     }
 
     /// The program itself: another build may bake other bytes under the same version.
@@ -432,7 +467,14 @@ impl Library {
     }
 
     /// Brings an entry's files to the output, from the cache or by baking them into it first.
-    fn make(&self, job: &Job, key: &Key, flags: &Flags, report: &mut EntryReport) -> Result<Status, Error> {
+    fn make(
+        &self,
+        job: &Job,
+        key: &Key,
+        flags: &Flags,
+        bars: &Progress,
+        report: &mut EntryReport,
+    ) -> Result<Status, Error> {
         if let Some(entry) = self.cache.get(key)
             && let Some(copied) = self.place(job, key, &entry, report)?
         {
@@ -442,7 +484,7 @@ impl Library {
         self.cache.remove(key)?;
         let work = self.cache.work_folder()?;
         let output = files_of(&work);
-        let silent = Console { quiet: true, json: false };
+        let silent = Console { quiet: true, json: false, bars: Some(bars.of(&job.name)) };
         let reports = match flags {
             Flags::Bake(flags) => {
                 let flags = Args { input: job.input.clone(), output: Some(output), ..(**flags).clone() };
@@ -454,6 +496,10 @@ impl Library {
             Flags::Detail(flags) => {
                 let flags = SolveArgs { target: job.input.clone(), output, ..(**flags).clone() };
                 solve_target(&flags, &silent)?;
+                Vec::new()
+            }
+            Flags::Skin(flags) => {
+                skin_lut::run(&skin_lut::Args { output, ..(**flags).clone() }, &silent)?;
                 Vec::new()
             }
         };
@@ -514,6 +560,39 @@ impl Library {
         Ok(Some(copied))
     }
 
+    /// Folders of entries that no input stands for any more. While an input is missing nothing is said: its folder has
+    /// a name that nobody knows.
+    fn gone(&self, entries: &[EntryReport]) -> Vec<PathBuf> {
+        if entries.iter().any(|entry| entry.kind.is_none()) {
+            return Vec::new();
+        }
+        let standing = lock(&self.standing);
+        let known = |folder: &&PathBuf| entries.iter().any(|entry| entry.folder == **folder);
+        standing.keys().filter(|folder| !known(folder)).cloned().collect()
+    }
+
+    /// Removes the files that this program put into these folders, and the folders where nothing is left; files that
+    /// somebody has changed since stay and are told.
+    fn prune(&self, folders: &[PathBuf], console: &Console) -> Result<(), Error> {
+        for folder in folders {
+            let path = self.output.join(folder);
+            let known = lock(&self.standing).remove(folder).unwrap_or_default();
+            for (file, stamp) in known.files {
+                let Some(file) = relative(&file.name).map(|name| path.join(name)) else { continue };
+                match Stamp::of(&file) {
+                    None => {}
+                    Some(now) if now == stamp => {
+                        std::fs::remove_file(&file).map_err(|e| kinran_image::Error::io(&file, e))?;
+                    }
+                    Some(_) => console.warn(format!("{}: was changed and stays", file.display())),
+                }
+            }
+            let inside = path.ancestors().take_while(|inside| *inside != self.output);
+            inside.take_while(|inside| std::fs::remove_dir(inside).is_ok()).for_each(drop);
+        }
+        Ok(())
+    }
+
     /// Saves what is known of inputs and output, so that the next run need not look at their bytes.
     fn save(&self) -> Result<(), Error> {
         let state = self.output.join(STATE);
@@ -549,7 +628,7 @@ fn refuse_input(job: &Job, path: &Path) -> Result<(), Error> {
     let Ok(existing) = path.canonicalize() else { return Ok(()) };
     let beside = match job.kind {
         Kind::Aniso => Some(job.input.as_path()),
-        Kind::Mesh | Kind::Detail => job.input.parent(),
+        Kind::Mesh | Kind::Detail | Kind::Skin => job.input.parent(),
     };
     let home = beside.and_then(|folder| folder.canonicalize().ok());
     if home.is_some_and(|home| existing.parent() == Some(&home)) {

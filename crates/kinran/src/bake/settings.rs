@@ -1,4 +1,4 @@
-//! Flags of `kinran bake` and `kinran detail solve` as a manifest gives them.
+//! Flags of `kinran bake`, `kinran detail solve` and `kinran skin-lut` as a manifest gives them.
 
 use clap::{ArgAction, CommandFactory, Parser};
 use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError, Setting, SettingValue};
@@ -6,6 +6,7 @@ use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError, Setting, Setting
 use super::Args;
 use crate::Error;
 use crate::detail::SolveArgs;
+use crate::skin_lut;
 
 /// Flags that say what a run does, not how an entry is baked.
 const OF_THE_RUN: [&str; 6] = ["output", "watch", "jobs", "cache", "dry-run", "help"];
@@ -24,6 +25,13 @@ struct DetailFlags {
     args: SolveArgs,
 }
 
+#[derive(Parser)]
+#[command(name = "skin-lut", no_binary_name = true)]
+struct SkinFlags {
+    #[command(flatten)]
+    args: skin_lut::Args,
+}
+
 /// How an entry is baked; input and output are not set.
 #[derive(Clone, Debug)]
 pub(super) enum Flags {
@@ -31,6 +39,8 @@ pub(super) enum Flags {
     Bake(Box<Args>),
     /// [`Kind::Detail`].
     Detail(Box<SolveArgs>),
+    /// [`Kind::Skin`].
+    Skin(Box<skin_lut::Args>),
 }
 
 /// Refuses flags that a manifest sets for its entries.
@@ -56,6 +66,9 @@ pub(super) fn refuse_others(args: &Args) -> Result<(), Error> {
 /// The flags of a job.
 pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestError> {
     let mut all = words_before(job.kind);
+    if job.kind == Kind::Skin && !job.input.as_os_str().is_empty() {
+        all.push(format!("--profile={}", job.input.display()));
+    }
     for setting in &job.settings {
         all.extend(words(manifest, job.kind, setting)?);
     }
@@ -67,7 +80,13 @@ pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestErr
             layer.tile = manifest.beside(&layer.tile);
             layer.mask = layer.mask.as_ref().map(|mask| manifest.beside(mask));
         }
+        args.model = args.model.as_ref().map(|model| manifest.beside(model));
         return Ok(Flags::Detail(Box::new(args)));
+    }
+    if job.kind == Kind::Skin {
+        let mut args = SkinFlags::try_parse_from(all).map_err(wrong)?.args;
+        args.profile = args.profile.as_ref().map(|profile| manifest.beside(profile));
+        return Ok(Flags::Skin(Box::new(args)));
     }
     let mut args = BakeFlags::try_parse_from(all).map_err(wrong)?.args;
     for path in args.map.iter_mut().map(|(_, path)| path).chain(&mut args.ignore) {
@@ -82,6 +101,7 @@ fn command(kind: Kind) -> clap::Command {
     match kind {
         Kind::Aniso | Kind::Mesh => BakeFlags::command(),
         Kind::Detail => DetailFlags::command(),
+        Kind::Skin => SkinFlags::command(),
     }
 }
 
@@ -90,6 +110,7 @@ fn words_before(kind: Kind) -> Vec<String> {
     let words: &[&str] = match kind {
         Kind::Aniso | Kind::Mesh => &["input"],
         Kind::Detail => &["input", "--output=output"],
+        Kind::Skin => &["--output=output"],
     };
     words.iter().map(|&word| word.into()).collect()
 }
@@ -106,6 +127,11 @@ fn try_word(kind: Kind, name: &str, word: &str) -> Result<(), clap::Error> {
             }
             DetailFlags::try_parse_from(all).map(drop)
         }
+        Kind::Skin => match SkinFlags::try_parse_from(all) {
+            // Some flags come in pairs.
+            Err(e) if e.kind() == clap::error::ErrorKind::MissingRequiredArgument => Ok(()),
+            result => result.map(drop),
+        },
     }
 }
 
@@ -118,8 +144,8 @@ fn words(manifest: &Manifest, kind: Kind, setting: &Setting) -> Result<Vec<Strin
         known.filter(|_| !OF_THE_RUN.contains(&name.as_str()))
     };
     let Some(argument) = find(&command) else {
-        let other = if kind == Kind::Detail { Kind::Aniso } else { Kind::Detail };
-        if setting.is_default && find(&self::command(other)).is_some() {
+        let others = [Kind::Aniso, Kind::Detail, Kind::Skin].into_iter().filter(|other| *other != kind);
+        if setting.is_default && others.map(self::command).any(|other| find(&other).is_some()) {
             return Ok(Vec::new());
         }
         return Err(manifest.error(&setting.place, unknown(&command, name)));

@@ -224,7 +224,7 @@ pub(super) fn write_glb(
 }
 
 /// Header, JSON padded with spaces, binary padded with zeros.
-fn container(mut json: Vec<u8>, mut binary: Vec<u8>) -> Vec<u8> {
+pub(crate) fn container(mut json: Vec<u8>, mut binary: Vec<u8>) -> Vec<u8> {
     json.resize(json.len().next_multiple_of(4), b' ');
     binary.resize(binary.len().next_multiple_of(4), 0);
     let mut glb = b"glTF\x02\0\0\0".to_vec();

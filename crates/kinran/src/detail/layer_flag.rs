@@ -23,6 +23,8 @@ pub struct LayerFlag {
     pub saturation: f32,
     /// Factor of value.
     pub value: f32,
+    /// How much of it is seen, 0 to 1.
+    pub opacity: f32,
     /// Where the layer is seen.
     pub mask: Option<PathBuf>,
     /// 0 red to 3 alpha.
@@ -35,7 +37,7 @@ pub struct LayerFlag {
 
 /// Names that a layer takes, for the message.
 const NAMES: &str =
-    "scale, rotation, offset, mirror, hue, saturation, value, mask, channel, contrast, y-down";
+    "scale, rotation, offset, mirror, hue, saturation, value, opacity, mask, channel, contrast, y-down";
 
 /// `FILE[,NAME=VALUE]...`
 pub(crate) fn layer_flag(text: &str) -> Result<LayerFlag, String> {
@@ -51,6 +53,7 @@ pub(crate) fn layer_flag(text: &str) -> Result<LayerFlag, String> {
         hue: 0.0,
         saturation: 1.0,
         value: 1.0,
+        opacity: 1.0,
         mask: None,
         channel: 0,
         contrast: 1.0,
@@ -77,6 +80,12 @@ pub(crate) fn layer_flag(text: &str) -> Result<LayerFlag, String> {
             "hue" => layer.hue = number()?,
             "saturation" => layer.saturation = factor()?,
             "value" => layer.value = factor()?,
+            "opacity" => {
+                layer.opacity = number()?;
+                if !(0.0..=1.0).contains(&layer.opacity) {
+                    return Err(format!("opacity={value}: write a number from 0 to 1"));
+                }
+            }
             "mask" if !value.is_empty() => layer.mask = Some(value.into()),
             "channel" => {
                 layer.channel = ["r", "g", "b", "a"]
@@ -132,6 +141,7 @@ mod tests {
             "a,mask=",
             "a,hue=nan",
             "a,value=-1",
+            "a,opacity=2",
         ] {
             assert!(layer_flag(bad).is_err(), "{bad:?} became {:?}", layer_flag(bad));
         }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::Vec2;
 use kinran_bake::detail::{
     Comparison, DetailOptions, Layer, LayerTransform, MapKind, Mask, Paint, PaintGuides, Target, Tile,
-    TileOptions, compare, level_pictures,
+    TileOptions, bearable_opacity, compare, level_pictures,
 };
 use kinran_bake::folder::{Green, Role, named_maps};
 use kinran_image::{Channels, Encoding, Image, Pixels, encode_png, read_image, write_atomically};
@@ -21,8 +21,9 @@ use crate::{Console, Error};
 /// FOLDER holds a folder for each material, with maps named as exporters name them. Every target is painted (grime by
 /// occlusion and in cavities, rubbed edges, large-scale colour) over its material and a second one in patches, tiled at
 /// twice the target's density, and solved twice: "own" against the tiles it was painted over, as in the talk, and "other"
-/// against the one tile of all other materials that is nearest in its colours. Numbers are those of the second mip, as in
-/// the talk, and of the first.
+/// against the one tile of all other materials that is nearest in its colours; with --fade a third time, "faded", where
+/// that tile has the largest opacity with which the result is no worse than the compressed target. Numbers are those of
+/// the second mip, as in the talk, and of the first.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran detail report materials/ -o report/
@@ -52,6 +53,10 @@ pub struct LibraryArgs {
     /// Centre the histograms of the tiles
     #[arg(long)]
     pub center: bool,
+
+    /// Also solve against the other tile faded until the result is no worse than the compressed target
+    #[arg(long)]
+    pub fade: bool,
 
     /// No pictures, numbers only
     #[arg(long)]
@@ -91,6 +96,29 @@ impl Material {
     }
 }
 
+/// Which tiles a target was solved against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Against {
+    /// Those it was painted over.
+    Own,
+    /// The nearest of another material.
+    Other,
+    /// The same, at the largest opacity with which the result is no worse than the compressed target.
+    Faded,
+}
+
+impl Against {
+    /// As it is called in tables and file names.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Against::Own => "own",
+            Against::Other => "other",
+            Against::Faded => "faded",
+        }
+    }
+}
+
 /// One target solved in one way.
 #[derive(Clone, Debug, Serialize)]
 pub struct LibraryRow {
@@ -102,8 +130,10 @@ pub struct LibraryRow {
     pub format: String,
     /// The materials whose tiles it was solved against.
     pub tiles: Vec<String>,
-    /// Whether these are the tiles it was painted over.
-    pub own: bool,
+    /// Which tiles these are.
+    pub against: Against,
+    /// Their opacity.
+    pub opacity: f32,
     /// The numbers.
     pub comparison: Comparison,
 }
@@ -115,8 +145,10 @@ pub struct LibraryMean {
     pub map: String,
     /// Their format.
     pub format: String,
-    /// Solved against the tiles painted over.
-    pub own: bool,
+    /// Which tiles.
+    pub against: Against,
+    /// Mean opacity of the tiles.
+    pub opacity: f32,
     /// 0 the finest.
     pub level: usize,
     /// How many.
@@ -253,7 +285,7 @@ fn solve_map(
 
     let options = DetailOptions::new(encoding);
     let mut rows = Vec::new();
-    let mut solve = |layers: &[Layer], tiles: Vec<String>, own: bool| -> Result<(), Error> {
+    let mut solve = |layers: &[Layer], tiles: Vec<String>, against: Against| -> Result<(), Error> {
         let (comparison, solved) = compare(&target, layers, &options, &|_| {})?;
         if let Some(folder) = pictures {
             let shown = level_pictures(&target, layers, &options, &solved, 1)?;
@@ -266,8 +298,7 @@ fn solve_map(
                 &shown.error,
                 &shown.target_error,
             ]) {
-                let which = if own { "own" } else { "other" };
-                let file = page::picture_file(&material.name, map.role.name(), which, name);
+                let file = page::picture_file(&material.name, map.role.name(), against.name(), name);
                 write_atomically(&folder.join(file), &encode_png(&crop(picture, side)?)?)?;
             }
         }
@@ -276,13 +307,14 @@ fn solve_map(
             map: map.role.name().into(),
             format: format!("{:?}", encoding.format).to_uppercase(),
             tiles,
-            own,
+            against,
+            opacity: layers[0].opacity,
             comparison,
         });
         Ok(())
     };
     let second_name = others.get(others.len() / 3).map(|&i| materials[i].name.clone());
-    solve(&own, std::iter::once(material.name.clone()).chain(second_name).collect(), true)?;
+    solve(&own, std::iter::once(material.name.clone()).chain(second_name).collect(), Against::Own)?;
     let near = others.iter().copied().min_by(|&a, &b| {
         let distance =
             |i: usize| distance(&image, &materials[i].map(map.role).expect("it was looked for").image);
@@ -290,7 +322,15 @@ fn solve_map(
     });
     if let Some(near) = near {
         let tile = tile_of(materials[near].map(map.role).expect("it was looked for"), encoding, args.center)?;
-        solve(&[layer_of(&tile, args.size)], vec![materials[near].name.clone()], false)?;
+        let (layer, name) = (layer_of(&tile, args.size), vec![materials[near].name.clone()]);
+        solve(&[layer], name.clone(), Against::Other)?;
+        // An aniso map has an opacity of its own.
+        if args.fade
+            && map.kind != MapKind::Aniso
+            && let Some(opacity) = bearable_opacity(&target, &[layer], &options)?
+        {
+            solve(&[Layer { opacity, ..layer }], name, Against::Faded)?;
+        }
     }
     Ok(rows)
 }
@@ -400,13 +440,13 @@ fn read_materials(args: &LibraryArgs) -> Result<Vec<Material>, Error> {
 }
 
 fn means(rows: &[LibraryRow]) -> Vec<LibraryMean> {
-    let mut groups: std::collections::BTreeMap<(String, String, bool, usize), Vec<&LibraryRow>> =
+    let mut groups: std::collections::BTreeMap<(String, String, Against, usize), Vec<&LibraryRow>> =
         Default::default();
     for row in rows {
         for level in [1, 0] {
             if row.comparison.levels.len() > level {
                 groups
-                    .entry((row.map.clone(), row.format.clone(), !row.own, 1 - level))
+                    .entry((row.map.clone(), row.format.clone(), row.against, 1 - level))
                     .or_default()
                     .push(row);
             }
@@ -414,7 +454,7 @@ fn means(rows: &[LibraryRow]) -> Vec<LibraryMean> {
     }
     groups
         .into_iter()
-        .map(|((map, format, other, level), rows)| {
+        .map(|((map, format, against, level), rows)| {
             let level = 1 - level;
             let mean = |of: &dyn Fn(&kinran_bake::detail::LevelComparison) -> f32| {
                 rows.iter().map(|row| of(&row.comparison.levels[level])).sum::<f32>() / rows.len() as f32
@@ -426,7 +466,8 @@ fn means(rows: &[LibraryRow]) -> Vec<LibraryMean> {
             LibraryMean {
                 map,
                 format,
-                own: !other,
+                against,
+                opacity: rows.iter().map(|row| row.opacity).sum::<f32>() / rows.len() as f32,
                 level,
                 count: rows.len(),
                 target: mean(&|e| e.target),
@@ -446,6 +487,7 @@ fn text(report: &LibraryReport) -> String {
             "map",
             "format",
             "tiles",
+            "opacity",
             "mip",
             "count",
             "target",

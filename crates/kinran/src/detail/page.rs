@@ -26,11 +26,12 @@ figure { margin: 0; } figcaption { color: var(--faint); font-size: .8rem; } img 
 ";
 
 /// A mean as a row of cells.
-pub(super) fn cells(mean: &LibraryMean) -> [String; 11] {
+pub(super) fn cells(mean: &LibraryMean) -> [String; 12] {
     [
         mean.map.clone(),
         mean.format.clone(),
-        if mean.own { "own".into() } else { "other".into() },
+        mean.against.name().into(),
+        format!("{:.2}", mean.opacity),
         mean.level.to_string(),
         mean.count.to_string(),
         format!("{:.3}", mean.target),
@@ -48,6 +49,7 @@ pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
         "map",
         "format",
         "tiles",
+        "opacity",
         "mip",
         "count",
         "target alone",
@@ -68,7 +70,7 @@ pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
                 .enumerate()
                 .map(
                     |(i, cell)| {
-                        if i == 6 { format!("<td class=\"{class}\">{cell}") } else { format!("<td>{cell}") }
+                        if i == 7 { format!("<td class=\"{class}\">{cell}") } else { format!("<td>{cell}") }
                     },
                 )
                 .collect();
@@ -99,7 +101,8 @@ pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
 <h1>Detail maps</h1>
 <p>Targets of {size} x {size} texels, painted over tiled materials and solved. Errors are root mean squares in steps of 8
 bits, for normals in degrees, of the second mip and of the first. \"own\": against the tiles the target was painted over;
-\"other\": against the nearest tile of another material. Error pictures are 8 times enlarged.</p>
+\"other\": against the nearest tile of another material; \"faded\": against that at the largest opacity with which the result is
+no worse than the compressed target. Error pictures are 8 times enlarged.</p>
 <table>
 <tr>{head}
 {means}</table>
@@ -110,7 +113,7 @@ bits, for normals in degrees, of the second mip and of the first. \"own\": again
 }
 
 fn section(row: &LibraryRow, first: bool, pictures: bool) -> String {
-    let which = if row.own { "own" } else { "other" };
+    let which = row.against.name();
     let heading = if first { format!("<h2>{}, {}</h2>\n", row.material, row.map) } else { String::new() };
     let errors = row.comparison.levels.get(1).unwrap_or(&row.comparison.levels[0]);
     let saved = 100.0 * (1.0 - row.comparison.synthesized_bytes as f64 / row.comparison.unique_bytes as f64);

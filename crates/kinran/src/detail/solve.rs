@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use glam::vec3;
 use kinran_bake::detail::{
     Comparison, DetailOptions, Layer, LayerTransform, LevelError, MapKind, Mask, Resolution, Solved, Target,
-    Tile, TileOptions, compare, level_pictures, lowest_resolution, solve,
+    Tile, TileOptions, bearable_opacity, compare, level_pictures, lowest_resolution, solve,
 };
 use kinran_image::{Image, encode_dds, encode_ktx2, encode_png, read_image, read_texture, write_atomically};
 use serde::Serialize;
 
 use super::layer_flag::layer_flag;
+use super::model::{self, Written, channels_flag};
 use super::{BlockFormat, KindName, LayerFlag, default_format};
 use crate::bake::{Container, PresetName};
 use crate::outputs::{check_folder, has_extension};
@@ -26,14 +27,16 @@ use crate::{Console, Error};
 /// the GPU decodes them, level by level.
 ///
 /// A layer is FILE,NAME=VALUE,...: scale (4 or 4x2), rotation (degrees), offset, mirror, hue (degrees), saturation and
-/// value (factors), mask, channel (r, g, b, a) and contrast of the mask, y-down. The first layer lies at the bottom;
+/// value (factors), opacity, mask, channel (r, g, b, a) and contrast of the mask, y-down. The first layer lies at the bottom;
 /// each of the others needs a mask. FILE is an image, or a tile that was baked before (.ktx2, .dds).
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran detail solve helmet_color.png --layer steel.png,scale=4 -o baked/
   kinran detail solve wall.png --layer brick.png,scale=6 --layer moss.png,scale=9,mask=masks.png,channel=g -o baked/
   kinran detail solve wall_normal.png --kind normal --layer brick_normal.png,scale=6 -o baked/
-  kinran detail solve wall.png --layer brick.png,scale=6 --max-error 4 -o baked/ --pictures")]
+  kinran detail solve wall.png --layer brick.png,scale=6 --max-error 4 -o baked/ --pictures
+  kinran detail solve wall.png --layer brick.png,scale=6 -o baked/ --board && kinran view baked/wall.glb
+  kinran detail solve helmet.png --layer steel.png,scale=9 -o baked/ --model helmet.glb --material shell")]
 pub struct SolveArgs {
     /// The map to reproduce: an image of 8 or 16 bits or floats
     #[arg(value_name = "TARGET")]
@@ -87,6 +90,11 @@ pub struct SolveArgs {
     #[arg(long)]
     pub center: bool,
 
+    /// Fade the layers until the blended error is no higher than that of the target, compressed by itself: for tiles that have
+    /// little to do with it. The opacity stands in the report, for the shader
+    #[arg(long)]
+    pub fade: bool,
+
     /// The synthesized map gets the lowest resolution whose error, at the target's resolution, is not above this: RMSE in
     /// steps of 8 bits, degrees for normals
     #[arg(long, value_name = "ERROR", value_parser = |t: &str| number(t, 0.0..=255.0))]
@@ -99,6 +107,23 @@ pub struct SolveArgs {
     /// Also write pictures: detail, synthesized, blended, target, errors
     #[arg(long)]
     pub pictures: bool,
+
+    /// Also write NAME.glb, a board that carries the result, for kinran view and kinran render
+    #[arg(long, conflicts_with = "model")]
+    pub board: bool,
+
+    /// Also write this .glb or .gltf file with the result in a material; the target becomes the map that other viewers show
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
+
+    /// The material of --model; needed where it has several
+    #[arg(long, value_name = "NAME", requires = "model")]
+    pub material: Option<String>,
+
+    /// What the channels of a data target are, for --board and --model: o occlusion, r roughness, m metallic, - none
+    /// [default: orm, of grey maps r]
+    #[arg(long, value_name = "LETTERS", value_parser = channels_flag)]
+    pub channels: Option<String>,
 
     /// File format of the textures
     #[arg(long, value_enum, default_value_t)]
@@ -120,6 +145,9 @@ pub struct SolveReport {
     pub target_size: [u32; 2],
     /// Width and height of `s`.
     pub size: [u32; 2],
+    /// For `--fade`: the factor on the layers' opacity.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub opacity: Option<f32>,
     /// Errors, level by level.
     pub levels: Vec<LevelError>,
     /// For `--max-error`: what each resolution would have cost.
@@ -144,6 +172,7 @@ type Tiles = BTreeMap<(PathBuf, bool, bool), Tile>;
 /// # Errors
 /// Whatever is wrong with a file or a flag; each names the file.
 pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, Error> {
+    model::check(args)?;
     let kind = MapKind::from(args.kind);
     let format = args.format.unwrap_or_else(|| default_format(kind));
     let mut options = DetailOptions::new(format.encoding());
@@ -159,7 +188,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
 
     let tiles = read_tiles(args, kind, args.tile_format.unwrap_or(format))?;
     let tile = |file: &Path, y_down: bool, is_mask: bool| &tiles[&(file.to_path_buf(), y_down, is_mask)];
-    let layers: Vec<Layer> = args
+    let mut layers: Vec<Layer> = args
         .layer
         .iter()
         .map(|flag| Layer {
@@ -171,6 +200,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
                 mirror: flag.mirror,
             },
             hsv: vec3(flag.hue / 360.0, flag.saturation, flag.value),
+            opacity: flag.opacity,
             mask: flag.mask.as_ref().map(|file| Mask {
                 map: tile(file, false, true),
                 channel: flag.channel,
@@ -182,6 +212,17 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         named(&args.target, read_image(&args.target).and_then(|i| Target::new(&i, kind, args.y_down)))?;
     let size = (target.levels[0].width, target.levels[0].height);
 
+    let mut opacity = None;
+    if args.fade {
+        let found = bearable_opacity(&target, &layers, &options)?.ok_or_else(|| {
+            Error::Usage(
+                "--fade: even without the layers the error is above that of the compressed target; take a finer --format"
+                    .into(),
+            )
+        })?;
+        layers.iter_mut().for_each(|layer| layer.opacity *= found);
+        opacity = Some(found);
+    }
     let stage = console.progress().stage("solving", u64::from(size.0) * u64::from(size.1) * 4 / 3);
     let mut resolutions = Vec::new();
     if let Some(bound) = args.max_error {
@@ -206,6 +247,18 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
 
     let stem = file_stem(&args.target);
     let mut files = write_textures(args, &stem, &solved, &tiles)?;
+    if args.board || args.model.is_some() {
+        let texture = |file: &Path, y_down: bool, is_mask: bool| {
+            texture_files(args, &tile_name(&(file.to_path_buf(), y_down, is_mask), &tiles))
+        };
+        let written = Written {
+            synthesized: &texture_files(args, &format!("{stem}_synthesized")),
+            tile: &|layer| texture(&layer.tile, layer.y_down, false),
+            mask: &|layer| layer.mask.as_ref().map(|mask| texture(mask, false, true)),
+            opacity: opacity.unwrap_or(1.0),
+        };
+        files.extend(model::write(args, &stem, &target, &written)?);
+    }
     if args.pictures {
         let pictures = level_pictures(&target, &layers, &options, &solved, 0)?;
         let named: [(&str, &Image); 7] = [
@@ -229,6 +282,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         files,
         target_size: [size.0, size.1],
         size: [first.width, first.height],
+        opacity,
         levels: solved.levels,
         resolutions,
         comparison,
@@ -301,11 +355,18 @@ fn write_textures(
     };
     write(format!("{stem}_synthesized"), &solved.texture, "synthesized")?;
     for (key, tile) in tiles {
-        if !has_extension(&key.0, "ktx2") && !has_extension(&key.0, "dds") {
+        // A model finds its tiles beside it, also those that were baked before.
+        let baked = has_extension(&key.0, "ktx2") || has_extension(&key.0, "dds");
+        if !baked || args.board || args.model.is_some() {
             write(tile_name(key, tiles), &tile.texture, if key.2 { "mask" } else { "detail" })?;
         }
     }
     Ok(files)
+}
+
+/// The files of a texture.
+fn texture_files(args: &SolveArgs, name: &str) -> Vec<String> {
+    args.container.extensions().iter().map(|extension| format!("{name}.{extension}")).collect()
 }
 
 /// Name of a tile's or mask's texture: the image's, after its folder's where others are called so too.
@@ -354,6 +415,9 @@ fn text(report: &SolveReport) -> String {
             "synthesized {} bytes, shared tiles {}; the target alone {}, a unique map as fine as the tiles {}\n",
             c.synthesized_bytes, c.shared_bytes, c.target_bytes, c.unique_bytes
         );
+    }
+    if let Some(opacity) = report.opacity {
+        text += &format!("opacity of the layers: x {opacity}\n");
     }
     text + &format!("wrote {}\n", report.files.join(", "))
 }

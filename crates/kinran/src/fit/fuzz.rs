@@ -109,7 +109,9 @@ pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
     let report = Report { fit: &fit, table: tabulated };
     match args.lang {
         // Constants are what was asked for, not a summary of it.
-        Some(language) => Console { quiet: false, ..*console }.result(&report, &constants(&fit, language)),
+        Some(language) => {
+            Console { quiet: false, ..console.clone() }.result(&report, &constants(&fit, language))
+        }
         None => console.result(&report, &text(&fit, tabulated)),
     }
 }

@@ -280,6 +280,9 @@ impl App {
                     if let (Some(skin), Some(parameters)) = (&mut material.skin, &m.skin) {
                         parameters.apply(skin);
                     }
+                    if let (Some(detail), Some(parameters)) = (&mut material.detail, &m.detail) {
+                        parameters.apply(detail);
+                    }
                     let authored = model.authored[i].roughness.max(1e-3);
                     let relative = MaterialParameters { roughness: m.roughness / authored, ..m.clone() };
                     scene.set_material(&self.gpu, i, &material, relative.adjustment(mapped));

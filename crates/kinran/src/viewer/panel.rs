@@ -176,6 +176,9 @@ pub(super) fn panel(ui: &mut Ui, p: &mut Parameters, selected: &mut usize, shown
             }
             _ => {}
         }
+        if let Some(detail) = &mut m.detail {
+            detail.controls(ui);
+        }
         m.fuzz.sliders(ui);
         ui.horizontal(|ui| {
             ui.color_edit_button_rgb(&mut m.emissive);

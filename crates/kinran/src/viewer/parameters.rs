@@ -12,6 +12,7 @@ use kinran_scene::{AlphaMode, Light, LightKind};
 use kinran_shading::ALPHA_MIN;
 use serde::{Deserialize, Serialize};
 
+use super::detail::DetailParameters;
 use super::fuzz::FuzzParameters;
 use super::orbit::Orbit;
 use crate::Error;
@@ -76,6 +77,9 @@ pub(super) struct MaterialParameters {
     /// Where the material is skin.
     #[serde(default)]
     pub(super) skin: Option<SkinParameters>,
+    /// Where maps are blended from tiles.
+    #[serde(default)]
+    pub(super) detail: Option<DetailParameters>,
 }
 
 /// A material's skin as the sliders have it.
@@ -131,6 +135,7 @@ impl MaterialParameters {
             occlusion: m.occlusion_strength,
             fuzz: FuzzParameters::from(&m.fuzz),
             skin: m.skin.as_ref().map(SkinParameters::of),
+            detail: m.detail.as_ref().map(DetailParameters::from),
             opacity: m.base_color_factor.w,
             alpha_cutoff: match m.alpha_mode {
                 AlphaMode::Mask { cutoff } => cutoff,
