@@ -375,23 +375,6 @@ impl Document {
         textures.len() - 1
     }
 
-    /// Adds a texture whose one image is an extension's, for a use that readers may leave out: nothing is required of
-    /// them.
-    ///
-    /// # Panics
-    /// When the image does not exist.
-    pub fn add_optional_texture(&mut self, extension: TextureExtension, image: usize) -> usize {
-        assert!(image < array(&self.json, "images").len(), "image {image} does not exist");
-        self.use_extension(extension.name(), false);
-        let textures = array_mut(&mut self.json, "textures");
-        let texture = json!({ "extensions": { extension.name(): { "source": image } } });
-        if let Some(known) = textures.iter().position(|known| *known == texture) {
-            return known;
-        }
-        textures.push(texture);
-        textures.len() - 1
-    }
-
     /// Puts a texture into a material's slot; `texCoord`, `KHR_texture_transform`, `scale` and `strength`
     /// of the texture that was there stay.
     ///

@@ -140,7 +140,7 @@ fn detail(
         let dds = has_extension(Path::new(file), "dds");
         let extension = if dds { TextureExtension::Dds } else { TextureExtension::Ktx2 };
         let image = document.add_image_file(file);
-        let image = document.add_optional_texture(extension, image);
+        let image = document.add_optional_texture(None, &[(extension, image)]);
         Some(TextureRef {
             image,
             runtime: None,
