@@ -18,7 +18,7 @@ const HALVINGS: usize = 5;
 /// in blocks that were chosen by what they look like.
 ///
 /// # Errors
-/// As [`solve`](super::solve).
+/// As [`solve`](fn@super::solve).
 pub fn bearable_opacity(
     target: &Target,
     layers: &[Layer],
