@@ -316,9 +316,10 @@ fn the_probe_reflects_as_the_reference_does() {
     };
     let shot = Shot::new(vec3(0.0, 0.3, 3.0), 0.6);
     let shot = Shot { samples: 64, ..shot };
-    // The first frames' taps are as wide as their share of the lobe, which tells where the lobe is wide itself.
+    // The first frames' taps are as wide as their share of the lobe, which tells where the lobe is wide itself, and most
+    // at grazing view, where many of them are lost below the horizon and the share of the others is larger.
     for (roughness, mean, pixel) in
-        [(0.1, 0.01, 0.02), (0.4, 0.01, 0.02), (0.7, 0.02, 0.03), (1.0, 0.02, 0.03)]
+        [(0.1, 0.01, 0.02), (0.4, 0.01, 0.02), (0.7, 0.02, 0.08), (1.0, 0.02, 0.08)]
     {
         let scene = scene(vec![sphere(48)], vec![material(vec3(0.9, 0.8, 0.6), 1.0, roughness)]);
         let scene = prepare(&scene, Some(environment()));
