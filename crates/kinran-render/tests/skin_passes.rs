@@ -9,6 +9,7 @@ fn the_forward_pass_compiles_with_skin() {
         "frame.wgsl",
         "fuzz.wgsl",
         "lighting.wgsl",
+        "no_detail.wgsl",
         "surface.wgsl",
         "fuzz_surface.wgsl",
         "channels.wgsl",

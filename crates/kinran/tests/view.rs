@@ -287,10 +287,11 @@ fn a_person_can_drive_the_window() {
     let aside = window.saved(&parameters);
     assert_ne!(aside["orbit"]["target"], nearer["orbit"]["target"], "the right button moved nothing");
     display.keys(&["f", "c"]);
+    display.keys(&["Escape"]);
+    window.settle("the model again", |screen| screen == at_rest);
     let framed = window.saved(&parameters);
     assert_eq!(framed["orbit"], before["orbit"], "F did not frame the model");
     display.keys(&["Escape"]);
-    window.settle("the model again", |screen| screen == at_rest);
 
     // The picture without the controls.
     let picture = folder.path().join("square.view.png");
@@ -370,5 +371,5 @@ fn what_cannot_be_shown_is_refused_before_a_window_opens() {
     std::fs::create_dir(&shaders).unwrap();
     std::fs::write(shaders.join("forwards.wgsl"), "").unwrap();
     refused(&[text(&model), "--shaders", text(&shaders)], "forwards.wgsl");
-    assert_eq!(ShaderSource::files().count(), 16, "a new shader file needs its name in docs/realtime.md");
+    assert_eq!(ShaderSource::files().count(), 18, "a new shader file needs its name in docs/realtime.md");
 }
