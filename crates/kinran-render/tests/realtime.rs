@@ -316,10 +316,9 @@ fn the_probe_reflects_as_the_reference_does() {
     };
     let shot = Shot::new(vec3(0.0, 0.3, 3.0), 0.6);
     let shot = Shot { samples: 64, ..shot };
-    // A frame divides by its own taps' weight, which makes a small light come out too dark where few of eight taps see it:
-    // by six percent over a whole sphere at roughness 1, most at grazing view, where many taps are lost below the horizon.
+    // The first frames' taps are as wide as their share of the lobe, which tells where the lobe is wide itself.
     for (roughness, mean, pixel) in
-        [(0.1, 0.01, 0.02), (0.4, 0.01, 0.02), (0.7, 0.02, 0.08), (1.0, 0.08, 0.15)]
+        [(0.1, 0.01, 0.02), (0.4, 0.01, 0.02), (0.7, 0.02, 0.04), (1.0, 0.03, 0.06)]
     {
         let scene = scene(vec![sphere(48)], vec![material(vec3(0.9, 0.8, 0.6), 1.0, roughness)]);
         let scene = prepare(&scene, Some(environment()));
@@ -329,7 +328,7 @@ fn the_probe_reflects_as_the_reference_does() {
         let scene = scene(vec![sphere(48)], vec![material(vec3(0.9, 0.8, 0.6), 1.0, 1.0)]);
         let mut scene = prepare(&scene, Some(environment()));
         scene.materials[0].surface = Some(surface(alpha_t, alpha_b, degrees));
-        shot.agree(&format!("alphas {alpha_t}, {alpha_b} at {degrees}°"), &scene, 0.03, 0.06);
+        shot.agree(&format!("alphas {alpha_t}, {alpha_b} at {degrees}°"), &scene, 0.02, 0.03);
     }
 }
 
@@ -385,7 +384,7 @@ fn compressed_textures_read_as_they_do_decoded() {
     let worst = worst.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     // Half floats hold what was decoded to one part in two thousand, and highlights are steep.
     assert!(worst < 0.01, "compressed and decoded pictures are {worst} apart");
-    shot.agree("compressed", &scene, 0.01, 0.03);
+    shot.agree("compressed", &scene, 0.02, 0.03);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use kinran_bake::aniso::{
 };
 use kinran_bake::fuzz_fit::{Phase, fuzz_fit};
 use kinran_bake::{NoSurface, material_surface};
-use kinran_image::{Role, full_level_count, level_size};
+use kinran_image::{Role, Texture, full_level_count, level_size};
 use kinran_render::reference::{
     AnisoEncoding, BoundTexture, FuzzCoefficients, MipLevel, MipTexture, SurfaceTextures,
 };
@@ -41,7 +41,7 @@ impl Mips {
 
     /// What a model is drawn with unless someone asks for something else: its own mips if it has any.
     pub fn of(scene: &Scene) -> Self {
-        let baked = (0..scene.materials.len()).any(|i| baked_surface(scene, i).is_ok_and(|s| s.is_some()));
+        let baked = scene.materials.iter().any(|m| baked_maps(scene, m).is_some());
         if baked { Mips::Baked } else { Mips::Filtered(Filter::Ml) }
     }
 }
@@ -59,7 +59,7 @@ pub fn scene_surfaces(
     let mut warnings = Vec::new();
     let surfaces = (0..scene.materials.len()).map(|i| {
         let mips = match mips {
-            Mips::Baked => match baked_surface(scene, i)? {
+            Mips::Baked => match baked_surface(scene, &scene.materials[i])? {
                 Some(surface) => return Ok(Some(surface)),
                 None => Mips::Filtered(Filter::Ml),
             },
@@ -84,36 +84,52 @@ pub fn scene_surfaces(
     Ok((surfaces, warnings))
 }
 
-/// The surface that a material's own runtime textures hold; `None` where it has none of the maps that are filtered
-/// together, or one of them as an image only.
-fn baked_surface(scene: &Scene, material: usize) -> Result<Option<SurfaceTextures>, Error> {
-    let m = &scene.materials[material];
-    let runtime = |place: &TextureRef| place.runtime.and_then(|i| scene.textures.get(i)?.clone());
-    let bound = |place: &TextureRef| -> Result<Option<BoundTexture>, Error> {
-        let Some(texture) = runtime(place) else { return Ok(None) };
-        Ok(Some(BoundTexture::new(Arc::new(MipTexture::from_texture(&texture, place.wrap)?), place)))
-    };
-    // Where there is no map, it is flat, or round: a direction along the tangent, of no strength.
-    let or_constant = |place: Option<&TextureRef>, texel: [f32; 4]| match place {
-        Some(place) => bound(place),
-        None => Ok(Some(BoundTexture::constant(texel))),
-    };
+/// Where a material's own runtime textures of normals and roughness are, `None` for what it has no map of, and how they hold
+/// roughness. `None` where it has none of the maps that are filtered together, or one of them as an image only.
+fn baked_maps<'a>(
+    scene: &Scene,
+    m: &'a Material,
+) -> Option<(Option<&'a TextureRef>, Option<&'a TextureRef>, AnisoEncoding)> {
+    let is_image = |place: &TextureRef| runtime(scene, place).is_none();
     let anisotropy = m.anisotropy.as_ref().filter(|a| a.strength > 0.0);
-    let anisotropy_place = anisotropy.and_then(|a| a.texture.as_ref());
-    if m.normal.is_none() && m.aniso.is_none() && anisotropy_place.is_none() || m.normal_scale != 1.0 {
-        return Ok(None);
+    let anisotropy_map = anisotropy.and_then(|a| a.texture.as_ref());
+    let normal = m.normal.as_ref();
+    if (normal.is_none() && m.aniso.is_none() && anisotropy_map.is_none())
+        || m.normal_scale != 1.0
+        || normal.is_some_and(is_image)
+    {
+        return None;
     }
-    let Some(normal) = or_constant(m.normal.as_ref(), [0.5, 0.5, 1.0, 1.0])? else { return Ok(None) };
-    if let Some(aniso) = m.aniso.as_ref().map(bound).transpose()?.flatten() {
-        return Ok(Some(SurfaceTextures::new(normal, aniso)));
+    if let Some(aniso) = m.aniso.as_ref().filter(|place| !is_image(place)) {
+        return Some((normal, Some(aniso), AnisoEncoding::Texel));
     }
-    let roughness_is_image = m.metallic_roughness.as_ref().is_some_and(|place| runtime(place).is_none());
-    let Some(aniso) = or_constant(anisotropy_place, [1.0, 0.5, 1.0, 1.0])? else { return Ok(None) };
-    let encoding = AnisoEncoding::Khr {
-        strength: anisotropy.map_or(0.0, |a| a.strength),
-        rotation: anisotropy.map_or(0.0, |a| a.rotation),
+    if m.metallic_roughness.iter().chain(anisotropy_map).any(is_image) {
+        return None;
+    }
+    let strength = anisotropy.map_or(0.0, |a| a.strength);
+    let rotation = anisotropy.map_or(0.0, |a| a.rotation);
+    Some((normal, anisotropy_map, AnisoEncoding::Khr { strength, rotation }))
+}
+
+fn runtime<'a>(scene: &'a Scene, place: &TextureRef) -> Option<&'a Arc<Texture>> {
+    scene.textures.get(place.runtime?)?.as_ref()
+}
+
+/// The surface that a material's own runtime textures hold, see [`baked_maps`].
+fn baked_surface(scene: &Scene, m: &Material) -> Result<Option<SurfaceTextures>, Error> {
+    let Some((normal, aniso, encoding)) = baked_maps(scene, m) else { return Ok(None) };
+    let bound = |place: Option<&TextureRef>, texel: [f32; 4]| -> Result<BoundTexture, Error> {
+        match place.and_then(|place| Some((place, runtime(scene, place)?))) {
+            Some((place, texture)) => {
+                Ok(BoundTexture::new(Arc::new(MipTexture::from_texture(texture, place.wrap)?), place))
+            }
+            None => Ok(BoundTexture::constant(texel)),
+        }
     };
-    Ok((!roughness_is_image).then_some(SurfaceTextures { normal, aniso, encoding }))
+    // Where there is no map, it is flat, or round: a direction along the tangent.
+    let normal = bound(normal, [0.5, 0.5, 1.0, 1.0])?;
+    let aniso = bound(aniso, [1.0, 0.5, 1.0, 1.0])?;
+    Ok(Some(SurfaceTextures { normal, aniso, encoding }))
 }
 
 /// The sheets of a surface as decoded mip chains.

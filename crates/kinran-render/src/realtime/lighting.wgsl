@@ -142,13 +142,14 @@ fn specular_isotropic(surface: Surface, lobe: Lobe, u: vec3f) -> vec3f {
     return d * visibility * schlick_f(lobe.base_reflectance, dot(lobe.v, h)) * lobe.compensation;
 }
 
-// Lookups of the environment for a pixel's reflection; chosen by eye, half as many show a single frame's taps.
+// Lookups of the environment for a pixel's reflection; chosen by eye.
 const TAPS: u32 = 8u;
 
 // Light from all around, diffuse by spherical harmonics, specular by visible normals of the lobe, each reflecting the
 // environment filtered to its share of the lobe (Krivanek, Colbert 2008). One frame's taps cover the lobe, so that it is
 // smooth by itself; the n-th frame's are as narrow as those of n frames need be, so that their mean goes to the lobe's
-// own. Taps come in pairs half a turn apart: a tangent that turns round at a seam of the mesh changes nothing.
+// own. Taps count as differences to one lookup over the whole lobe, a control variate, so that a frame's light is right in
+// the mean and exact where light is the same all around. They come in pairs half a turn apart: a tangent that turns round at a seam of the mesh changes nothing.
 fn ambient(surface: Surface, lobe: Lobe) -> vec3f {
     if frame.counts.y == 0u {
         return vec3f(0.0);
@@ -167,8 +168,11 @@ fn ambient(surface: Surface, lobe: Lobe) -> vec3f {
 
     let to_world = mat3x3f(surface.tangent, surface.bitangent, surface.normal);
     let share = 1.0 / f32(TAPS * (frame.counts.w + 1u));
+    // A lookup as wide as the lobe has the lobe's albedo; the taps add how far they are from it, by what they pass.
+    let middle = normalize(to_world * vec3f(-lobe.v.xy, lobe.v.z));
+    let wide = probe(middle, min(4.0 * PI * surface.alpha_t * surface.alpha_b, 2.0 * PI));
+    let passed_by_view = 4.0 * lobe.v.z / (f32(TAPS) * smith_aniso_g1(lobe.v, surface.alpha_t, surface.alpha_b));
     var sum = vec3f(0.0);
-    var weights = vec3f(0.0);
     for (var i = 0u; i < TAPS; i++) {
         // The R2 sequence (Roberts 2018).
         let pair = f32((frame.counts.w * TAPS + i) / 2u);
@@ -180,11 +184,10 @@ fn ambient(surface: Surface, lobe: Lobe) -> vec3f {
             continue;
         }
         let density = ggx_vndf_pdf(lobe.v, h, surface.alpha_t, surface.alpha_b) / (4.0 * v_h);
-        let passed = smith_aniso_v(u, lobe.v, surface.alpha_t, surface.alpha_b) * u.z;
-        let weight = passed * schlick_f(lobe.base_reflectance, v_h);
-        sum += weight * probe(to_world * u, share / density);
-        weights += weight;
+        let passed = passed_by_view * smith_aniso_v(u, lobe.v, surface.alpha_t, surface.alpha_b) * u.z;
+        let difference = probe(to_world * u, share / density) - wide;
+        sum += passed * schlick_f(lobe.base_reflectance, v_h) * difference;
     }
-    let specular = sum / max(weights, vec3f(1e-9)) * lobe.albedo;
+    let specular = max(lobe.albedo * wide + lobe.compensation * sum, vec3f(0.0));
     return surface.occlusion * fuzz_over_ambient(surface.fuzz, diffuse, specular, coefficients);
 }

@@ -1,6 +1,6 @@
 // A material at a point of a mesh.
 
-// False in pipelines for materials that are neither fuzzy nor skin, which are most: their shader is a third as long.
+// False in pipelines for materials that are neither fuzzy nor skin, which are most.
 override LAYERED: bool = true;
 
 struct Material {
