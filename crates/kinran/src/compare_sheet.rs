@@ -1,11 +1,9 @@
 //! The layout of comparison pictures.
 
 use crate::compare::{Comparison, Difference, Series};
-use crate::picture::{Color, Picture};
+use crate::picture::{Color, INK, PAPER, Picture};
 
 /// All colours and lengths are chosen by eye.
-const PAPER: Color = [22, 23, 26];
-const INK: Color = [234, 234, 236];
 const FAINT: Color = [150, 153, 162];
 const BEST: Color = [126, 211, 138];
 

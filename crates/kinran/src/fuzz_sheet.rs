@@ -15,7 +15,7 @@ use kinran_shading::sh::sh_evaluate;
 use serde::Serialize;
 
 use crate::demo::noise::noise;
-use crate::picture::{Color, Picture};
+use crate::picture::{INK, PAPER, Picture};
 use crate::surfaces::{Mips, fuzz_coefficients, scene_surfaces};
 use crate::values::{number, vector};
 use crate::view::{View, ViewArgs, file_name};
@@ -102,9 +102,7 @@ pub enum Direction {
     Swirl,
 }
 
-/// Colours and lengths are chosen by eye.
-const PAPER: Color = [22, 23, 26];
-const INK: Color = [234, 234, 236];
+/// Pixels between pictures and for a line of words; chosen by eye.
 const GAP: u32 = 10;
 const LABEL: u32 = 26;
 

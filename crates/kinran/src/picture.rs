@@ -12,6 +12,10 @@ use crate::render::write_rgb8;
 /// Display-encoded sRGB.
 pub type Color = [u8; 3];
 
+/// What words and pictures stand on, and what words are written in; chosen by eye.
+pub(crate) const PAPER: Color = [22, 23, 26];
+pub(crate) const INK: Color = [234, 234, 236];
+
 /// An 8-bit sRGB picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {

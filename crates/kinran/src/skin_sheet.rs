@@ -19,7 +19,7 @@ use kinran_shading::skin::profile::Gaussian;
 use serde::Serialize;
 
 use crate::bake::curvature::{Blur, Joined, MethodName, deviations, meshes, unit};
-use crate::picture::{Color, Picture};
+use crate::picture::{Color, INK, PAPER, Picture};
 use crate::skin::{SIZE, profile, skin_table};
 use crate::skin_lut::plot::plot;
 use crate::surfaces::{Mips, scene_surfaces};
@@ -106,9 +106,7 @@ pub enum Sheet {
     Tensors,
 }
 
-/// Colours and lengths are chosen by eye.
-const PAPER: Color = [22, 23, 26];
-const INK: Color = [234, 234, 236];
+/// Pixels between pictures and for a line of words; chosen by eye.
 const GAP: u32 = 10;
 const LABEL: u32 = 26;
 

@@ -3,11 +3,9 @@
 use kinran_bake::skin_lut::Table;
 use kinran_bake::srgb_from_linear;
 
-use crate::picture::{Color, Picture};
+use crate::picture::{Color, INK, PAPER, Picture};
 
 /// All colours and lengths are chosen by eye.
-const PAPER: Color = [22, 23, 26];
-const INK: Color = [234, 234, 236];
 const FAINT: Color = [150, 153, 162];
 const GRID: Color = [52, 54, 60];
 const CHANNELS: [Color; 3] = [[240, 96, 88], [112, 204, 112], [104, 148, 250]];
