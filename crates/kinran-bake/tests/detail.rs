@@ -2,7 +2,8 @@
 
 use glam::{Vec2, vec2, vec3};
 use kinran_bake::detail::{
-    Blend, DetailOptions, Layer, LayerTransform, MapKind, Mask, Target, Tile, TileOptions, solve, synthesize,
+    Blend, DetailOptions, Layer, LayerTransform, MapKind, Mask, Target, Tile, TileOptions, compare, solve,
+    synthesize,
 };
 use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset};
 
@@ -213,6 +214,31 @@ fn compensation_and_choice_lower_the_blended_error() {
     assert!(both < compensated * 0.99, "wanted less than {compensated}, got {both}");
 }
 
+/// The finest level is better at its own size and no worse, but for a hundredth, where it is magnified.
+#[test]
+fn the_finest_level_takes_back_half_of_what_the_tiles_lost() {
+    let tile = tile(&scan(64, 64, 11), MapKind::Color, BC1);
+    let layer = Layer {
+        transform: LayerTransform { scale: Vec2::splat(4.0), ..LayerTransform::default() },
+        ..Layer::new(&tile)
+    };
+    let target = target(&scan(128, 128, 3), MapKind::Color);
+    let [none, half] = [0.0, 0.5].map(|finest_compensation| {
+        let options = DetailOptions { finest_compensation, ..options(BC1) };
+        compare(&target, &[layer], &options, &|_| {}).unwrap().0
+    });
+    let at = |c: &kinran_bake::detail::Comparison| (c.levels[0].blended, c.magnified.blended);
+    let ((own_none, magnified_none), (own_half, magnified_half)) = (at(&none), at(&half));
+    assert!(own_half < own_none * 0.95, "at its own size: without {own_none}, with {own_half}");
+    assert!(
+        magnified_half < magnified_none * 1.01,
+        "magnified: without {magnified_none}, with {magnified_half}"
+    );
+    // What the talk would do, and all levels below, are the same.
+    assert_eq!(half.levels[0].talk, none.levels[0].talk);
+    assert_eq!(half.levels[1], none.levels[1]);
+}
+
 #[test]
 fn mips_are_solved_and_not_averaged() {
     let tile = tile(&scan(64, 64, 11), MapKind::Color, BC1);
@@ -248,7 +274,8 @@ fn one_level_by_itself_is_the_solvers_own() {
     let target = target(&scan(64, 64, 3), MapKind::Color);
     let options = options(RGBA8);
     let solved = solve(&target, &[Layer::new(&tile)], &options, &|_| {}).unwrap();
-    let level = synthesize(&target, &[Layer::new(&tile)], &options, 1).unwrap();
+    let mut level = Vec::new();
+    synthesize(&target, &[Layer::new(&tile)], &options, 1, &mut level).unwrap();
     assert_eq!(level, solved.texture.levels[1].data);
 }
 

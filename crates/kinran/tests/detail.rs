@@ -260,7 +260,6 @@ fn a_report_covers_a_folder_of_materials() {
         "64",
         "--format",
         "bc1",
-        "--fade",
     ]);
     let rows = report["rows"].as_array().unwrap();
     let of = |against: &str| rows.iter().filter(|row| row["against"] == against).count();
@@ -372,8 +371,8 @@ fn sample_materials_are_solved_better_than_by_the_talk() {
             mean["map"], mean["against"], mean["level"]
         );
         assert!(blended <= talk, "{mean}");
-        // On the second mip, as the talk measures, and better than its +2.5 %.
-        if mean["map"] == "color" && mean["against"] == "own" && mean["level"] == 1 {
+        // On the second mip, as the talk measures, and better than its +2.5 %; and on the first.
+        if mean["map"] == "color" && mean["against"] == "own" {
             assert!(blended < target, "{mean}");
         }
     }

@@ -15,10 +15,11 @@ mod bc5;
 mod bc7;
 
 use kinran_image::Format;
+use pulp::Simd;
 
 use super::code::{code_from_linear, linear_from_byte};
 use super::map::MapKind;
-use super::solve::{Blend, Operator, Over, Plain, Smooth};
+use super::solve::{Blend, Operator, Over, Plain, RUN, Smooth, run_of};
 
 /// Texels of a block.
 const TEXELS: usize = 16;
@@ -45,6 +46,32 @@ enum Blending {
     Smooth,
     Plain,
     Over(f32),
+}
+
+/// What one `s` makes of any detail `d`: `slope d + offset`. Given `s`, every blend here is straight in `d`, but the
+/// smooth overlay has other numbers below d = 1/2 than above. So a value of a block is worked out once, and each of
+/// sixteen texels costs a multiplication.
+#[derive(Clone, Copy, Default)]
+struct Line {
+    /// Slope and offset below d = 1/2.
+    dark: [f32; 2],
+    /// From there on.
+    bright: [f32; 2],
+}
+
+impl Blending {
+    #[inline(always)]
+    fn line(self, s: f32) -> Line {
+        let x = 2.0 * s - 1.0;
+        let bright = if s < 0.5 { [2.0 * s, 0.0] } else { [2.0 * (1.0 - s), x] };
+        match self {
+            Blending::Smooth if s >= 0.5 => Line { dark: [2.0 * s * (1.0 - x * x), s * x * x], bright },
+            Blending::Smooth | Blending::Plain => Line { dark: bright, bright },
+            Blending::Over(alpha) => {
+                Line { dark: [alpha, s * (1.0 - alpha)], bright: [alpha, s * (1.0 - alpha)] }
+            }
+        }
+    }
 }
 
 /// How `s` is stored.
@@ -108,62 +135,124 @@ impl pulp::WithSimd for ChooseBand<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let blend = match (self.kind, self.blend) {
-            (MapKind::Normal, _) => return self.choose_normals(),
-            (MapKind::Aniso, _) => Blending::Over(self.alpha),
-            (_, Blend::Smooth) => Blending::Smooth,
-            (_, Blend::Plain) => Blending::Plain,
-        };
-        self.choose(blend);
+    fn with_simd<S: Simd>(self, simd: S) {
+        match (self.kind, self.blend) {
+            (MapKind::Normal, _) => self.choose_normals(simd),
+            (MapKind::Aniso, _) => {
+                let alpha = self.alpha;
+                self.choose(simd, Over(alpha), Blending::Over(alpha));
+            }
+            (_, Blend::Smooth) => self.choose(simd, Smooth, Blending::Smooth),
+            (_, Blend::Plain) => self.choose(simd, Plain, Blending::Plain),
+        }
     }
 }
 
+/// One row of what blocks should achieve, up to whole blocks; in the order of [`BlockGoal`]'s fields.
+type GoalRow = [[Vec<f32>; 3]; 5];
+
 impl ChooseBand<'_> {
     #[inline(always)]
-    fn choose(self, blend: Blending) {
+    fn choose<S: Simd>(self, simd: S, operator: impl Operator, blend: Blending) {
         let size = if self.format == Format::Bc7 { 16 } else { 8 };
         let columns = self.width.div_ceil(4);
-        for i in 0..self.blocks.len() / size {
-            let mut goal = self.goal(i % columns * 4, i / columns * 4);
-            goal.solve(blend, self.stored);
-            let block = &mut self.blocks[i * size..][..size];
-            match (self.format, block.len()) {
-                (Format::Bc4, 8) => bc4::choose(block, &goal, blend),
-                (Format::Bc7, 16) => bc7::choose(block, &goal, self.stored, blend),
-                _ => block.copy_from_slice(&bc1::choose(&goal, self.stored, blend)),
+        let mut lines = [Line::default(); 256];
+        for (byte, line) in (0..=255).zip(&mut lines) {
+            *line = blend.line(self.stored.value(byte));
+        }
+        let thirds = bc1::Thirds::new(&lines);
+        let zeros = || std::array::from_fn(|_| std::array::from_fn(|_| vec![0.0; columns * 4]));
+        let mut rows: [GoalRow; 4] = std::array::from_fn(|_| zeros());
+        for (blocks, y0) in self.blocks.chunks_exact_mut(columns * size).zip((0..).step_by(4)) {
+            for (i, row) in rows.iter_mut().enumerate() {
+                match self.target.get(y0 + i) {
+                    Some(target) => goal_row(
+                        target,
+                        &self.detail[y0 + i],
+                        (self.kind, self.stored),
+                        operator,
+                        columns * 4,
+                        row,
+                    ),
+                    // Below the image there is nothing to be achieved.
+                    None => row.iter_mut().flatten().for_each(|plane| plane.fill(0.0)),
+                }
+            }
+            for (column, block) in blocks.chunks_exact_mut(size).enumerate() {
+                let goal = BlockGoal::of_rows(&rows, column);
+                match self.format {
+                    Format::Bc4 => bc4::choose(simd, block, &goal, blend),
+                    Format::Bc7 => bc7::choose(simd, block, &goal, &lines),
+                    _ => block.copy_from_slice(&bc1::choose(simd, &goal, &thirds)),
+                }
             }
         }
     }
 
     #[inline(always)]
-    fn choose_normals(self) {
+    fn choose_normals<S: Simd>(self, simd: S) {
         let columns = self.width.div_ceil(4);
         for i in 0..self.blocks.len() / 16 {
-            let goal = self.goal(i % columns * 4, i / columns * 4);
-            bc5::choose(&mut self.blocks[i * 16..][..16], &goal);
+            let goal = self.normals(i % columns * 4, i / columns * 4);
+            bc5::choose(simd, &mut self.blocks[i * 16..][..16], &goal);
         }
     }
 
-    /// Target and detail of the block whose first texel is (`x0`, `y0`).
+    /// Target, detail and which texels there are, of the block whose first texel is (`x0`, `y0`).
     #[inline(always)]
-    fn goal(&self, x0: usize, y0: usize) -> BlockGoal {
+    fn normals(&self, x0: usize, y0: usize) -> BlockGoal {
         let mut goal = BlockGoal::zeros();
         let columns = 4.min(self.width - x0);
         for (y, (target, detail)) in self.target[y0..].iter().zip(&self.detail[y0..]).take(4).enumerate() {
             let row = 4 * y..4 * y + columns;
-            goal.inside[row.clone()].fill(1.0);
             for channel in 0..3 {
+                goal.gain[channel][row.clone()].fill(1.0);
                 goal.t[channel][row.clone()].copy_from_slice(&target[channel][x0..x0 + columns]);
                 goal.d[channel][row.clone()].copy_from_slice(&detail[channel][x0..x0 + columns]);
             }
         }
-        for channel in 0..3 {
-            for i in 0..TEXELS {
-                goal.gain[channel][i] = code_gain(self.kind, goal.t[channel][i]) * goal.inside[i];
+        goal
+    }
+}
+
+/// Sets a row of goals, `padded` texels of it.
+#[inline(always)]
+fn goal_row(
+    target: &[&[f32]; 3],
+    detail: &[Vec<f32>; 3],
+    (kind, stored): (MapKind, Stored),
+    operator: impl Operator,
+    padded: usize,
+    row: &mut GoalRow,
+) {
+    row.iter_mut().flatten().for_each(|plane| {
+        plane.clear();
+        plane.resize(padded, 0.0);
+    });
+    let width = target[0].len();
+    for c in 0..3 {
+        for x0 in (0..width).step_by(RUN) {
+            let (t, d) = (run_of(target[c], x0), run_of(&detail[c], x0));
+            let mut v = operator.inverse_run(&t, &d);
+            let (mut weight, mut gain) = ([0.0; RUN], [0.0; RUN]);
+            for i in 0..RUN {
+                gain[i] = code_gain(kind, t[i]);
+                weight[i] = operator.slope(v[i], d[i]) * gain[i];
+            }
+            for i in 0..RUN {
+                let (texel, slope) = stored.texel(v[i]);
+                v[i] = texel;
+                weight[i] *= slope;
+            }
+            for i in 0..RUN {
+                // A texel that hardly matters still has a place.
+                weight[i] = weight[i] * weight[i] + 1.0;
+            }
+            let run = x0..width.min(x0 + RUN);
+            for (plane, values) in row.iter_mut().zip([v, weight, d, t, gain]) {
+                plane[c][run.clone()].copy_from_slice(&values[..run.len()]);
             }
         }
-        goal
     }
 }
 
@@ -179,86 +268,95 @@ struct BlockGoal {
     t: [[f32; TEXELS]; 3],
     /// Steps of 8 bits for a difference of one in the blended value; zero outside of the image.
     gain: [[f32; TEXELS]; 3],
-    /// 1 in the image, 0 outside.
-    inside: [f32; TEXELS],
 }
 
 impl BlockGoal {
     fn zeros() -> Self {
         let zeros = [[0.0; TEXELS]; 3];
-        BlockGoal { v: zeros, weight: zeros, d: zeros, t: zeros, gain: zeros, inside: [0.0; TEXELS] }
-    }
-
-    /// Sets the exact solution and its weights.
-    #[inline(always)]
-    fn solve(&mut self, blend: Blending, stored: Stored) {
-        match blend {
-            Blending::Smooth => self.solve_by(Smooth, stored),
-            Blending::Plain => self.solve_by(Plain, stored),
-            Blending::Over(alpha) => self.solve_by(Over(alpha), stored),
-        }
+        BlockGoal { v: zeros, weight: zeros, d: zeros, t: zeros, gain: zeros }
     }
 
     #[inline(always)]
-    fn solve_by(&mut self, operator: impl Operator, stored: Stored) {
-        for channel in 0..3 {
-            for i in 0..TEXELS {
-                let s = operator.inverse(self.t[channel][i], self.d[channel][i]);
-                let (v, slope) = stored.texel(s);
-                let step = operator.slope(s, self.d[channel][i]) * self.gain[channel][i] * slope;
-                self.v[channel][i] = v;
-                // A texel that hardly matters still has a place.
-                self.weight[channel][i] = step * step + self.inside[i];
+    fn of_rows(rows: &[GoalRow; 4], column: usize) -> Self {
+        let mut goal = BlockGoal::zeros();
+        let BlockGoal { v, weight, d, t, gain } = &mut goal;
+        for (field, planes) in [v, weight, d, t, gain].into_iter().enumerate() {
+            for (channel, plane) in planes.iter_mut().enumerate() {
+                for (y, texels) in plane.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+                    texels.copy_from_slice(&rows[y][field][channel][4 * column..][..4]);
+                }
             }
         }
+        goal
     }
 
-    /// Squared differences to the target in one channel where texels have `s`.
+    /// Texels of one channel in the `part`th register.
     #[inline(always)]
-    fn errors(&self, channel: usize, s: &[f32; TEXELS], blend: Blending) -> [f32; TEXELS] {
-        let (d, t, gain) = (&self.d[channel], &self.t[channel], &self.gain[channel]);
-        match blend {
-            Blending::Smooth => errors_by(Smooth, s, d, t, gain),
-            Blending::Plain => errors_by(Plain, s, d, t, gain),
-            Blending::Over(alpha) => errors_by(Over(alpha), s, d, t, gain),
+    fn lanes<S: Simd>(&self, simd: S, channel: usize, part: usize) -> Lanes<S> {
+        let d = lanes_of::<S>(&self.d[channel], part);
+        Lanes {
+            dark: simd.less_than_f32s(d, simd.splat_f32s(0.5)),
+            d,
+            t: lanes_of::<S>(&self.t[channel], part),
+            gain: lanes_of::<S>(&self.gain[channel], part),
         }
+    }
+
+    /// What each texel is nearest to, of the choices whose values in the first `CHANNELS` channels are `lines`.
+    #[inline(always)]
+    fn nearest<S: Simd, const CHANNELS: usize>(&self, simd: S, lines: &[[Line; CHANNELS]]) -> Nearest {
+        let mut nearest = Nearest { errors: [0.0; TEXELS], choices: [0; TEXELS] };
+        let (errors, _) = S::as_mut_simd_f32s(&mut nearest.errors);
+        let (choices, _) = S::as_mut_simd_u32s(&mut nearest.choices);
+        for (part, (errors, choices)) in errors.iter_mut().zip(choices).enumerate() {
+            let mut texels = [self.lanes(simd, 0, part); CHANNELS];
+            for (c, texels) in texels.iter_mut().enumerate().skip(1) {
+                *texels = self.lanes(simd, c, part);
+            }
+            let (mut least, mut choice) = (simd.splat_f32s(f32::INFINITY), simd.splat_u32s(0));
+            for (i, lines) in lines.iter().enumerate() {
+                let mut error = texels[0].error(simd, &lines[0]);
+                for (texels, line) in texels.iter().zip(lines).skip(1) {
+                    error = simd.add_f32s(error, texels.error(simd, line));
+                }
+                let nearer = simd.less_than_f32s(error, least);
+                least = simd.select_f32s(nearer, error, least);
+                choice = simd.select_u32s(nearer, simd.splat_u32s(i as u32), choice);
+            }
+            (*errors, *choices) = (least, choice);
+        }
+        nearest
     }
 
     /// Two colours on either end of the line along which the solution lies, as far as it reaches.
     #[inline(always)]
-    fn line(&self) -> [[f32; 3]; 2] {
-        let (mut total, mut scale) = ([0.0; 3], [0.0; 3]);
-        for channel in 0..3 {
-            total[channel] = sum(&self.weight[channel]);
-            scale[channel] = total[channel].max(1e-20).sqrt();
+    fn line<S: Simd>(&self, simd: S) -> [[f32; 3]; 2] {
+        let (mut mean, mut scale) = ([0.0; 3], [0.0; 3]);
+        for c in 0..3 {
+            let total = sum(&self.weight[c]).max(1e-20);
+            mean[c] = dot(simd, &self.weight[c], &self.v[c]) / total;
+            scale[c] = total.sqrt();
         }
-        let mut texel_weight = [0.0; TEXELS];
-        for channel in 0..3 {
-            for i in 0..TEXELS {
-                texel_weight[i] += self.weight[channel][i];
+        // Deviations from the mean, in units in which all channels count alike, and with the texel's weight.
+        let (mut p, mut weighted) = ([[0.0; TEXELS]; 3], [[0.0; TEXELS]; 3]);
+        for part in 0..TEXELS / S::F32_LANES {
+            let weight = simd.add_f32s(
+                simd.add_f32s(lanes_of::<S>(&self.weight[0], part), lanes_of::<S>(&self.weight[1], part)),
+                lanes_of::<S>(&self.weight[2], part),
+            );
+            let inside = simd.less_than_f32s(simd.splat_f32s(0.0), weight);
+            for c in 0..3 {
+                let apart = simd.sub_f32s(lanes_of::<S>(&self.v[c], part), simd.splat_f32s(mean[c]));
+                let apart = simd.mul_f32s(apart, simd.splat_f32s(scale[c]));
+                let apart = simd.select_f32s(inside, apart, simd.splat_f32s(0.0));
+                S::as_mut_simd_f32s(&mut p[c]).0[part] = apart;
+                S::as_mut_simd_f32s(&mut weighted[c]).0[part] = simd.mul_f32s(apart, weight);
             }
         }
-        // Deviations from the mean, in units in which all channels count alike.
-        let mut p = [[0.0; TEXELS]; 3];
-        let mut mean = [0.0; 3];
-        for channel in 0..3 {
-            let mut weighted = [0.0; TEXELS];
-            for i in 0..TEXELS {
-                weighted[i] = self.weight[channel][i] * self.v[channel][i];
-            }
-            mean[channel] = sum(&weighted) / total[channel].max(1e-20);
-            for i in 0..TEXELS {
-                p[channel][i] = (self.v[channel][i] - mean[channel]) * scale[channel] * self.inside[i];
-            }
-        }
-        let mut weighted = p;
-        for channel in 0..3 {
-            for i in 0..TEXELS {
-                weighted[channel][i] *= texel_weight[i];
-            }
-        }
-        let (xx, yy, zz) = (dot(&p[0], &weighted[0]), dot(&p[1], &weighted[1]), dot(&p[2], &weighted[2]));
-        let (xy, xz, yz) = (dot(&p[0], &weighted[1]), dot(&p[0], &weighted[2]), dot(&p[1], &weighted[2]));
+        let (xx, yy, zz) =
+            (dot(simd, &p[0], &weighted[0]), dot(simd, &p[1], &weighted[1]), dot(simd, &p[2], &weighted[2]));
+        let (xy, xz, yz) =
+            (dot(simd, &p[0], &weighted[1]), dot(simd, &p[0], &weighted[2]), dot(simd, &p[1], &weighted[2]));
         // The power method, from the column of the largest variance.
         let mut axis = if xx >= yy && xx >= zz {
             [xx, xy, xz]
@@ -274,30 +372,71 @@ impl BlockGoal {
             axis = axis.map(|a| a / largest);
         }
         let length = (axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]).max(1e-20);
-        let (mut low, mut high) = (0.0_f32, 0.0_f32);
-        for i in 0..TEXELS {
-            let along = (p[0][i] * axis[0] + p[1][i] * axis[1] + p[2][i] * axis[2]) / length;
-            (low, high) = (low.min(along), high.max(along));
+        let mut along = [0.0; TEXELS];
+        for part in 0..TEXELS / S::F32_LANES {
+            let mut sum = simd.splat_f32s(0.0);
+            for c in 0..3 {
+                let term = simd.mul_f32s(lanes_of::<S>(&p[c], part), simd.splat_f32s(axis[c]));
+                sum = simd.add_f32s(sum, term);
+            }
+            S::as_mut_simd_f32s(&mut along).0[part] = sum;
         }
-        let at = |along: f32| std::array::from_fn(|c| (mean[c] + along * axis[c] / scale[c]).clamp(0.0, 1.0));
+        let (mut low, mut high) = (0.0, 0.0);
+        for v in along {
+            (low, high) = (if v < low { v } else { low }, if v > high { v } else { high });
+        }
+        let at = |along: f32| {
+            std::array::from_fn(|c| (mean[c] + along / length * axis[c] / scale[c]).clamp(0.0, 1.0))
+        };
         [at(high), at(low)]
     }
 }
 
-#[inline(always)]
-fn errors_by(
-    operator: impl Operator,
-    s: &[f32; TEXELS],
-    d: &[f32; TEXELS],
-    t: &[f32; TEXELS],
-    gain: &[f32; TEXELS],
-) -> [f32; TEXELS] {
-    let mut errors = [0.0; TEXELS];
-    for i in 0..TEXELS {
-        let difference = (operator.blend(s[i], d[i]) - t[i]) * gain[i];
-        errors[i] = difference * difference;
+/// What texels are nearest to.
+struct Nearest {
+    /// Squared differences of the blended result.
+    errors: [f32; TEXELS],
+    choices: [u32; TEXELS],
+}
+
+/// Texels of one channel, as many as a register takes.
+#[derive(Clone, Copy)]
+struct Lanes<S: Simd> {
+    dark: S::m32s,
+    d: S::f32s,
+    t: S::f32s,
+    gain: S::f32s,
+}
+
+impl<S: Simd> Lanes<S> {
+    /// Squared differences to the target where all texels have one `s`.
+    #[inline(always)]
+    fn error(&self, simd: S, line: &Line) -> S::f32s {
+        let slope =
+            simd.select_f32s(self.dark, simd.splat_f32s(line.dark[0]), simd.splat_f32s(line.bright[0]));
+        let offset =
+            simd.select_f32s(self.dark, simd.splat_f32s(line.dark[1]), simd.splat_f32s(line.bright[1]));
+        // Not fused, so that all processors give the same bits.
+        let blended = simd.mul_f32s(slope, self.d);
+        let difference = simd.add_f32s(blended, simd.sub_f32s(offset, self.t));
+        let steps = simd.mul_f32s(difference, self.gain);
+        simd.mul_f32s(steps, steps)
     }
-    errors
+}
+
+#[inline(always)]
+fn lanes_of<S: Simd>(values: &[f32; TEXELS], part: usize) -> S::f32s {
+    S::as_simd_f32s(values).0[part]
+}
+
+#[inline(always)]
+fn dot<S: Simd>(simd: S, a: &[f32; TEXELS], b: &[f32; TEXELS]) -> f32 {
+    let mut products = [0.0; TEXELS];
+    for part in 0..TEXELS / S::F32_LANES {
+        S::as_mut_simd_f32s(&mut products).0[part] =
+            simd.mul_f32s(lanes_of::<S>(a, part), lanes_of::<S>(b, part));
+    }
+    sum(&products)
 }
 
 /// Steps of 8 bits of the map's code for a small difference at the target `t`: for colour the slope of the sRGB curve,
@@ -316,18 +455,22 @@ fn code_gain(kind: MapKind, t: f32) -> f32 {
 /// The two ends whose mixtures, by the shares of the first, are nearest to `v`. Where all shares are alike or nothing has
 /// a weight, both are the mean.
 #[inline(always)]
-fn least_squares(shares: &[f32; TEXELS], v: &[f32; TEXELS], w: &[f32; TEXELS]) -> (f32, f32) {
-    let (mut aa, mut ab, mut bb) = ([0.0; TEXELS], [0.0; TEXELS], [0.0; TEXELS]);
-    let (mut va, mut vb) = ([0.0; TEXELS], [0.0; TEXELS]);
-    for i in 0..TEXELS {
-        let (a, b) = (shares[i], 1.0 - shares[i]);
-        aa[i] = w[i] * a * a;
-        ab[i] = w[i] * a * b;
-        bb[i] = w[i] * b * b;
-        va[i] = w[i] * a * v[i];
-        vb[i] = w[i] * b * v[i];
+fn least_squares<S: Simd>(
+    simd: S,
+    shares: &[f32; TEXELS],
+    v: &[f32; TEXELS],
+    w: &[f32; TEXELS],
+) -> (f32, f32) {
+    let (mut rest, mut wa, mut wb) = ([0.0; TEXELS], [0.0; TEXELS], [0.0; TEXELS]);
+    for part in 0..TEXELS / S::F32_LANES {
+        let (share, w) = (lanes_of::<S>(shares, part), lanes_of::<S>(w, part));
+        let other = simd.sub_f32s(simd.splat_f32s(1.0), share);
+        S::as_mut_simd_f32s(&mut rest).0[part] = other;
+        S::as_mut_simd_f32s(&mut wa).0[part] = simd.mul_f32s(w, share);
+        S::as_mut_simd_f32s(&mut wb).0[part] = simd.mul_f32s(w, other);
     }
-    let (aa, ab, bb, va, vb) = (sum(&aa), sum(&ab), sum(&bb), sum(&va), sum(&vb));
+    let (aa, ab, bb) = (dot(simd, &wa, shares), dot(simd, &wa, &rest), dot(simd, &wb, &rest));
+    let (va, vb) = (dot(simd, &wa, v), dot(simd, &wb, v));
     let determinant = aa * bb - ab * ab;
     if determinant > 1e-4 * (aa + bb) * (aa + bb) {
         ((va * bb - vb * ab) / determinant, (vb * aa - va * ab) / determinant)
@@ -337,29 +480,10 @@ fn least_squares(shares: &[f32; TEXELS], v: &[f32; TEXELS], w: &[f32; TEXELS]) -
     }
 }
 
-/// The lower of two arrays, texel by texel.
-#[inline(always)]
-fn lower(a: &[f32; TEXELS], b: &[f32; TEXELS]) -> [f32; TEXELS] {
-    let mut lower = [0.0; TEXELS];
-    for i in 0..TEXELS {
-        lower[i] = if a[i] < b[i] { a[i] } else { b[i] };
-    }
-    lower
-}
-
-#[inline(always)]
-fn dot(a: &[f32; TEXELS], b: &[f32; TEXELS]) -> f32 {
-    let mut products = [0.0; TEXELS];
-    for i in 0..TEXELS {
-        products[i] = a[i] * b[i];
-    }
-    sum(&products)
-}
-
-/// A sum in a fixed order that runs in lanes.
+/// A sum of sixteen: halves on halves, so that it runs in lanes, and in the same order on every processor.
 #[inline(always)]
 fn sum(values: &[f32; TEXELS]) -> f32 {
-    let mut lanes = [0.0; 8];
+    let mut lanes = [0.0; TEXELS / 2];
     for i in 0..8 {
         lanes[i] = values[i] + values[i + 8];
     }
@@ -373,7 +497,51 @@ fn sum(values: &[f32; TEXELS]) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+    use kinran_shading::detail::{detail_over, overlay, smooth_overlay};
+
     use super::*;
+
+    struct One<'a>(&'a BlockGoal, Line);
+
+    impl pulp::WithSimd for One<'_> {
+        type Output = [f32; TEXELS];
+
+        fn with_simd<S: Simd>(self, simd: S) -> [f32; TEXELS] {
+            self.0.nearest(simd, &[[self.1]]).errors
+        }
+    }
+
+    /// Texels of all details and targets, errors by the lines and by the operators as they are.
+    #[test]
+    fn lines_are_the_operators() {
+        let mut goal = BlockGoal::zeros();
+        for (blending, blend) in [
+            (Blending::Smooth, smooth_overlay as fn(f32, f32) -> f32),
+            (Blending::Plain, overlay),
+            (Blending::Over(0.3), |s, d| detail_over(Vec3::splat(s), Vec3::splat(d), 0.3).x),
+        ] {
+            for step in 0..=200 {
+                let s = step as f32 / 200.0;
+                for i in 0..TEXELS {
+                    goal.d[0][i] = i as f32 / 15.0;
+                    goal.t[0][i] = ((i * 7) % 16) as f32 / 15.0;
+                    goal.gain[0][i] = 1.0;
+                }
+                let got = pulp::Arch::new().dispatch(One(&goal, blending.line(s)));
+                for i in 0..TEXELS {
+                    let want = (blend(s, goal.d[0][i]) - goal.t[0][i]).powi(2);
+                    assert!(
+                        (got[i] - want).abs() < 1e-6,
+                        "{blending:?}, s = {s}, d = {}, t = {}: wanted {want}, got {}",
+                        goal.d[0][i],
+                        goal.t[0][i],
+                        got[i]
+                    );
+                }
+            }
+        }
+    }
 
     #[test]
     fn weights_are_the_slope_of_the_srgb_curve() {

@@ -1,7 +1,7 @@
 //! What each part of the method is worth: the talk's table, for one target.
 
 use glam::{Mat2, Vec2, Vec3};
-use kinran_image::{Encoding, Error, Texture};
+use kinran_image::{Encoding, Error, Format, Texture};
 use kinran_scene::Wrap;
 use kinran_shading::normal_from_xy;
 use rayon::prelude::*;
@@ -31,11 +31,26 @@ pub struct LevelComparison {
     pub uncompensated: f32,
 }
 
+/// Errors of the finest level where it is magnified twice, and the tiles are seen twice as fine: against the exact
+/// solution, not compressed and magnified likewise, over the tiles as authored; the compressed target against the target
+/// magnified likewise. In the unit of [`LevelError::error`](super::LevelError::error), over every fourth row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MagnifiedComparison {
+    /// The target itself, compressed; no detail.
+    pub target: f32,
+    /// Everything.
+    pub blended: f32,
+    /// The talk's method.
+    pub talk: f32,
+}
+
 /// A target with and without its tiles, and what they cost.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Finest level first.
     pub levels: Vec<LevelComparison>,
+    /// The finest level magnified.
+    pub magnified: MagnifiedComparison,
     /// Bytes of `s` with its mips.
     pub synthesized_bytes: u64,
     /// Bytes of the tiles and masks, which other targets share.
@@ -46,7 +61,8 @@ pub struct Comparison {
     pub unique_bytes: u64,
 }
 
-/// Measures a target with `options` (their `blend`, `compensate` and `choose` are varied here).
+/// Measures a target with `options` (their `blend`, `compensate` and `choose` are varied here). Texels are finished five
+/// times, as far as `progress` is told: four solutions and the compressed target.
 ///
 /// # Errors
 /// As [`solve`].
@@ -58,15 +74,17 @@ pub fn compare(
 ) -> Result<(Comparison, Solved), Error> {
     let everything =
         DetailOptions { blend: Blend::Smooth, compensate: true, choose: true, measure_all: true, ..*options };
-    let talk = DetailOptions { choose: false, ..everything };
+    let talk = DetailOptions { choose: false, finest_compensation: 0.0, ..everything };
     let plain = DetailOptions { blend: Blend::Plain, ..talk };
     let uncompensated = DetailOptions { compensate: false, ..talk };
     let solved = solve(target, layers, &everything, progress)?;
     let errors = |options: &DetailOptions| -> Result<Vec<f32>, Error> {
         Ok(solve(target, layers, options, progress)?.levels.iter().map(|level| level.error).collect())
     };
-    let (talk, plain, uncompensated) = (errors(&talk)?, errors(&plain)?, errors(&uncompensated)?);
-    let alone = compress(&target.levels[options.first_level..], target.kind, options.encoding)?;
+    let talk_solved = solve(target, layers, &talk, progress)?;
+    let talk: Vec<f32> = talk_solved.levels.iter().map(|level| level.error).collect();
+    let (plain, uncompensated) = (errors(&plain)?, errors(&uncompensated)?);
+    let alone = compress(&target.levels[options.first_level..], target.kind, options.encoding, progress)?;
     let alone_errors = compressed_errors(target, &alone, options.first_level)?;
     let levels = solved
         .levels
@@ -84,6 +102,7 @@ pub fn compare(
         .collect();
     let comparison = Comparison {
         levels,
+        magnified: magnified(target, layers, &everything, [&alone, &solved.texture, &talk_solved.texture])?,
         synthesized_bytes: texture_bytes(&solved.texture),
         shared_bytes: layers.iter().map(shared_bytes).sum(),
         target_bytes: texture_bytes(&alone),
@@ -117,8 +136,9 @@ pub(crate) fn solved_errors(
     layers: &[Layer],
     options: &DetailOptions,
     levels: std::ops::Range<usize>,
+    progress: &(impl Fn(u64) + Sync),
 ) -> Result<Vec<f32>, Error> {
-    let solved = solve_levels(target, layers, options, levels, &|_| {})?;
+    let solved = solve_levels(target, layers, options, levels, progress)?;
     Ok(solved.levels.iter().map(|level| level.error).collect())
 }
 
@@ -128,20 +148,13 @@ pub(crate) fn compressed_errors(target: &Target, texture: &Texture, first: usize
         .map(|level| {
             let decoded = decoded_level(texture, level, target.kind)?;
             let wanted = &target.levels[first + level];
-            let rows: Vec<Sums> = (0..wanted.height as usize)
-                .into_par_iter()
-                .map(|y| {
-                    let mut sums = Sums { texels: u64::from(wanted.width), ..Sums::default() };
-                    for x in 0..wanted.width as usize {
-                        let texel = vector(&decoded, target.kind, x, y);
-                        sums.sum += squared_error(texel, vector(wanted, MapKind::Data, x, y), target);
-                    }
-                    sums
-                })
-                .collect();
-            let mut all = Sums::default();
-            rows.iter().for_each(|sums| all.add(sums));
-            Ok(all.error(target))
+            Ok(row_errors(target, wanted.height, 1, |y, sums, _| {
+                for x in 0..wanted.width as usize {
+                    let texel = vector(&decoded, target.kind, x, y);
+                    sums.sum += squared_error(texel, vector(wanted, MapKind::Data, x, y), target);
+                }
+                sums.texels += u64::from(wanted.width);
+            }))
         })
         .collect()
 }
@@ -175,7 +188,8 @@ pub struct LowestResolution {
     pub resolutions: Vec<Resolution>,
 }
 
-/// Finds the lowest resolution of `s` with an error of at most `bound` at the target's resolution.
+/// Finds the lowest resolution of `s` with an error of at most `bound` at the target's resolution. `progress` is told of
+/// texels as in [`solve`]; each resolution has a quarter of those of the one before.
 ///
 /// # Errors
 /// As [`solve`].
@@ -184,11 +198,12 @@ pub fn lowest_resolution(
     layers: &[Layer],
     options: &DetailOptions,
     bound: f32,
+    progress: &(impl Fn(u64) + Sync),
 ) -> Result<LowestResolution, Error> {
     let mut found = LowestResolution { level: None, resolutions: Vec::new() };
     for first_level in 0..target.levels.len() {
         let options = DetailOptions { first_level, ..*options };
-        let solved = solve(target, layers, &options, &|_| {})?;
+        let solved = solve(target, layers, &options, progress)?;
         let error = magnified_error(target, layers, &options, &solved)?;
         let (width, height) = (solved.levels[0].width, solved.levels[0].height);
         found.resolutions.push(Resolution { width, height, error, bytes: texture_bytes(&solved.texture) });
@@ -207,30 +222,106 @@ fn magnified_error(
     options: &DetailOptions,
     solved: &Solved,
 ) -> Result<f32, Error> {
-    // Normals too are filtered before they are decoded.
-    let finest = [synthesized_level(&solved.texture, 0)?];
     let wanted = &target.levels[0];
+    let finest = synthesized_level(&solved.texture, 0)?;
     let size = (wanted.width, wanted.height);
-    let fetch = Fetch::new(&finest, size, Mat2::IDENTITY, Vec2::ZERO, Wrap::Clamp);
-    let detail = DetailRows::new(layers, target.kind, size, Seen::Decoded);
-    let rows: Vec<Sums> = (0..wanted.height as usize)
-        .into_par_iter()
-        .map_init(RowRoom::default, |room, y| {
-            let mut row = <[Vec<f32>; 3]>::default();
-            detail.row(y, room, &mut row);
-            let mut s: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; size.0 as usize]);
-            fetch.row(y, &mut s.each_mut().map(Vec::as_mut_slice));
-            let mut sums = Sums { texels: u64::from(size.0), ..Sums::default() };
-            for x in 0..size.0 as usize {
-                let texel = Vec3::from(std::array::from_fn(|c| s[c][x]));
-                let d = Vec3::from(std::array::from_fn(|c| row[c][x]));
-                let blended = blend(texel, d, target.kind, options);
-                sums.sum += squared_error(blended, vector(wanted, MapKind::Data, x, y), target);
+    let blended = Magnified::new(std::slice::from_ref(&finest), layers, target.kind, size, Seen::Decoded);
+    Ok(row_errors(target, size.1, 1, |y, sums, room| {
+        let row = blended.row(y, options, target.kind, room);
+        for (x, texel) in row.into_iter().enumerate() {
+            sums.sum += squared_error(texel, vector(wanted, MapKind::Data, x, y), target);
+        }
+        sums.texels += u64::from(size.0);
+    }))
+}
+
+/// Rows of `s`, or of a map without layers, magnified to `size` texels and blended.
+struct Magnified<'a> {
+    fetch: Fetch<'a>,
+    detail: Option<DetailRows<'a>>,
+    size: (u32, u32),
+}
+
+impl<'a> Magnified<'a> {
+    fn new(finest: &'a [Planes], layers: &'a [Layer], kind: MapKind, size: (u32, u32), seen: Seen) -> Self {
+        // Normals too are filtered before they are decoded.
+        let fetch = Fetch::new(finest, size, Mat2::IDENTITY, Vec2::ZERO, Wrap::Clamp);
+        let detail = (!layers.is_empty()).then(|| DetailRows::new(layers, kind, size, seen));
+        Magnified { fetch, detail, size }
+    }
+
+    fn row(&self, y: usize, options: &DetailOptions, kind: MapKind, room: &mut RowRoom) -> Vec<Vec3> {
+        let width = self.size.0 as usize;
+        let mut s: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; width]);
+        self.fetch.row(y, &mut s.each_mut().map(Vec::as_mut_slice));
+        let texel = |row: &[Vec<f32>; 3], x: usize| Vec3::from(row.each_ref().map(|plane| plane[x]));
+        let Some(detail) = &self.detail else { return (0..width).map(|x| texel(&s, x)).collect() };
+        let mut row = <[Vec<f32>; 3]>::default();
+        detail.row(y, room, &mut row);
+        (0..width).map(|x| blend(texel(&s, x), texel(&row, x), kind, options)).collect()
+    }
+}
+
+/// How many rows there are to one that is measured where the finest level is magnified.
+const MAGNIFIED_STEP: usize = 4;
+
+/// The compressed target, `s` and another `s`, magnified twice.
+fn magnified(
+    target: &Target,
+    layers: &[Layer],
+    options: &DetailOptions,
+    [alone, blended, talk]: [&Texture; 3],
+) -> Result<MagnifiedComparison, Error> {
+    let first = options.first_level;
+    let exact = DetailOptions {
+        encoding: Encoding { format: Format::Rgba8, ..options.encoding },
+        finest_compensation: 0.0,
+        ..*options
+    };
+    let exact = solve_levels(target, layers, &exact, first..first + 1, &|_| {})?.texture;
+    let wanted = &target.levels[first];
+    let size = (wanted.width * 2, wanted.height * 2);
+    let kind = target.kind;
+    let error = |map: &[Planes], layers: &[Layer], wanted: (&[Planes], Seen)| {
+        let map = Magnified::new(map, layers, kind, size, Seen::Decoded);
+        let wanted = Magnified::new(wanted.0, layers, kind, size, wanted.1);
+        row_errors(target, size.1, MAGNIFIED_STEP, |y, sums, room| {
+            let (a, b) = (map.row(y, options, kind, room), wanted.row(y, options, kind, room));
+            for (a, b) in a.into_iter().zip(b) {
+                let a = if kind == MapKind::Normal { normal_from_xy(a.x, a.y) } else { a };
+                sums.sum += squared_error(a, b, target);
             }
+            sums.texels += u64::from(size.0);
+        })
+    };
+    let exact = [synthesized_level(&exact, 0)?];
+    let over_tiles = |texture: &Texture| -> Result<f32, Error> {
+        Ok(error(&[synthesized_level(texture, 0)?], layers, (&exact, Seen::Authored)))
+    };
+    Ok(MagnifiedComparison {
+        target: error(&[decoded_level(alone, 0, kind)?], &[], (std::slice::from_ref(wanted), Seen::Authored)),
+        blended: over_tiles(blended)?,
+        talk: over_tiles(talk)?,
+    })
+}
+
+/// Root mean square of what `measure` adds up over every `step`th row.
+fn row_errors(
+    target: &Target,
+    rows: u32,
+    step: usize,
+    measure: impl Fn(usize, &mut Sums, &mut RowRoom) + Sync,
+) -> f32 {
+    let rows: Vec<Sums> = (0..rows as usize)
+        .into_par_iter()
+        .step_by(step)
+        .map_init(RowRoom::default, |room, y| {
+            let mut sums = Sums::default();
+            measure(y, &mut sums, room);
             sums
         })
         .collect();
     let mut all = Sums::default();
     rows.iter().for_each(|sums| all.add(sums));
-    Ok(all.error(target))
+    all.error(target)
 }

@@ -57,13 +57,25 @@ impl Tile {
     /// [`Error::Unsupported`] where a sample lies outside [0, 1], the kind asks for more channels than the image has,
     /// or the encoder refuses.
     pub fn new(image: &Image, options: TileOptions) -> Result<Self, Error> {
+        Tile::bake(image, options, &|_| {})
+    }
+
+    /// [`new`](Tile::new), which tells `progress` how many texels of all levels were finished since it was last called.
+    ///
+    /// # Errors
+    /// As [`new`](Tile::new).
+    pub fn bake(
+        image: &Image,
+        options: TileOptions,
+        progress: &(impl Fn(u64) + Sync),
+    ) -> Result<Self, Error> {
         let TileOptions { kind, encoding, y_down, center } = options;
         let mut finest = planes_of_image(image, kind, y_down)?;
         if center && matches!(kind, MapKind::Color | MapKind::Data) {
             center_histogram(&mut finest);
         }
         let authored = mip_chain(finest, kind);
-        let texture = compress(&authored, kind, encoding)?;
+        let texture = compress(&authored, kind, encoding, progress)?;
         let decoded = decode_levels(&texture, kind)?;
         Ok(Tile { kind, texture, authored, decoded })
     }

@@ -1,7 +1,7 @@
 //! Maps as planes of the numbers a sampler filters, level by level.
 
 use kinran_image::{
-    Channels, Encoding, Error, Format, Image, Level, Pixels, Texture, Transfer, encode_parallel, level_size,
+    Channels, Encoding, Error, Format, Image, Level, Pixels, Texture, Transfer, encode, level_size,
 };
 use kinran_scene::Wrap;
 use kinran_shading::normal_from_xy;
@@ -209,17 +209,33 @@ pub(crate) fn bytes_of_planes(planes: &Planes, kind: MapKind) -> Vec<u8> {
     bytes
 }
 
-/// A map's chain, compressed.
+/// Rows that are compressed at a time: whole blocks.
+const BAND: usize = 64;
+
+/// A map's chain, compressed, in parallel; `progress` is told how many texels were finished since it was last called.
 ///
 /// # Errors
 /// [`Error::Unsupported`] where the encoder refuses.
-pub(crate) fn compress(levels: &[Planes], kind: MapKind, encoding: Encoding) -> Result<Texture, Error> {
+pub(crate) fn compress(
+    levels: &[Planes],
+    kind: MapKind,
+    encoding: Encoding,
+    progress: &(impl Fn(u64) + Sync),
+) -> Result<Texture, Error> {
     let levels = levels
         .iter()
         .map(|planes| {
-            let bytes = bytes_of_planes(planes, kind);
-            let data = encode_parallel(encoding, &bytes, planes.width, planes.height)?;
-            Ok(Level { width: planes.width, height: planes.height, data })
+            let width = planes.width as usize;
+            let bands: Vec<Vec<u8>> = bytes_of_planes(planes, kind)
+                .par_chunks(width * 4 * BAND)
+                .map(|band| {
+                    let rows = band.len() / (4 * width);
+                    let blocks = encode(encoding, band, planes.width, rows as u32);
+                    progress((width * rows) as u64);
+                    blocks
+                })
+                .collect::<Result<_, Error>>()?;
+            Ok(Level { width: planes.width, height: planes.height, data: bands.concat() })
         })
         .collect::<Result<_, Error>>()?;
     Ok(texture(encoding.format, kind.transfer(), levels))

@@ -33,11 +33,14 @@ mod pictures;
 mod sample;
 mod solve;
 
-pub use compare::{Comparison, LevelComparison, LowestResolution, Resolution, compare, lowest_resolution};
+pub use compare::{
+    Comparison, LevelComparison, LowestResolution, MagnifiedComparison, Resolution, compare,
+    lowest_resolution,
+};
 pub use kinran_scene::LayerTransform;
 pub use layer::{Layer, MAX_LAYERS, Mask, Tile, TileOptions, texture_bytes};
 pub use map::{MapKind, Planes};
-pub use opacity::bearable_opacity;
+pub use opacity::{FADE_TRIALS, bearable_opacity};
 pub use paint::{Paint, PaintGuides};
 pub use pictures::{ERROR_GAIN, LevelPictures, level_pictures};
 pub use solve::{Blend, DetailOptions, LevelError, Solved, Target, blend_level, solve, synthesize};

@@ -10,6 +10,9 @@ use super::solve::{DetailOptions, Target};
 /// Halvings of the interval in which the opacity is looked for: steps of 1/32.
 const HALVINGS: usize = 5;
 
+/// The most solutions that [`bearable_opacity`] takes: the whole opacity, each halving, and none.
+pub const FADE_TRIALS: u64 = HALVINGS as u64 + 2;
+
 /// The largest factor on the opacity of all layers, in steps of 1/32, with which the blended error is not above that of
 /// the compressed target, on the two finest levels of `s`. `None` where no factor is small enough.
 ///
@@ -17,21 +20,25 @@ const HALVINGS: usize = 5;
 /// own grain: blended error grows with the tile's contrast. At opacity 0 there is no tile left, and `s` is the target
 /// in blocks that were chosen by what they look like.
 ///
+/// The two levels are solved at most [`FADE_TRIALS`] times, and `progress` is told of their texels as in
+/// [`solve`](fn@super::solve).
+///
 /// # Errors
 /// As [`solve`](fn@super::solve).
 pub fn bearable_opacity(
     target: &Target,
     layers: &[Layer],
     options: &DetailOptions,
+    progress: &(impl Fn(u64) + Sync),
 ) -> Result<Option<f32>, Error> {
     let options = &DetailOptions { measure_all: true, ..*options };
     let finest = options.first_level..target.levels.len().min(options.first_level + 2);
-    let alone = compress(&target.levels[finest.clone()], target.kind, options.encoding)?;
+    let alone = compress(&target.levels[finest.clone()], target.kind, options.encoding, &|_| {})?;
     let alone = compressed_errors(target, &alone, options.first_level)?;
     let bears = |factor: f32| -> Result<bool, Error> {
         let layers: Vec<Layer> =
             layers.iter().map(|layer| Layer { opacity: layer.opacity * factor, ..*layer }).collect();
-        let errors = solved_errors(target, &layers, options, finest.clone())?;
+        let errors = solved_errors(target, &layers, options, finest.clone(), progress)?;
         Ok(errors.iter().zip(&alone).all(|(blended, alone)| blended <= alone))
     };
     if bears(1.0)? {

@@ -24,6 +24,9 @@ struct LevelFetch<'a> {
     weight: f32,
     /// Places along each axis, where the map does not rotate.
     axes: Option<[Vec<Tap>; 2]>,
+    /// The columns as runs of texels next to each other, where all lie on texels and no other level is mixed in: as when
+    /// a level of the tile is as fine as the map.
+    runs: Option<Vec<std::ops::Range<usize>>>,
 }
 
 /// Two neighbouring texels and how far from the first to the second.
@@ -83,7 +86,8 @@ impl<'a> Fetch<'a> {
                     axis(size.1, matrix.y_axis.y, offset.y, planes.height),
                 ]
             });
-            LevelFetch { planes, weight, axes }
+            let runs = axes.as_ref().and_then(|[columns, _]| runs(columns)).filter(|_| weight == 1.0);
+            LevelFetch { planes, weight, axes, runs }
         };
         let levels = if by == 0.0 {
             vec![level(finer, 1.0)]
@@ -103,7 +107,10 @@ impl<'a> Fetch<'a> {
                     for (channel, out) in out.iter_mut().enumerate() {
                         let upper = level.planes.row(channel, row.first as usize);
                         let lower = level.planes.row(channel, row.second as usize);
-                        straight_row(columns, upper, lower, row.by, level.weight, i == 0, out);
+                        match &level.runs {
+                            Some(runs) if row.by == 0.0 => copy_runs(runs, upper, out),
+                            _ => straight_row(columns, upper, lower, row.by, level.weight, i == 0, out),
+                        }
                     }
                 }
                 None => self.rotated_row(level, y, i == 0, out),
@@ -136,6 +143,28 @@ impl<'a> Fetch<'a> {
     }
 }
 
+/// Columns as runs of texels next to each other; `None` where one lies between texels.
+fn runs(columns: &[Tap]) -> Option<Vec<std::ops::Range<usize>>> {
+    let mut runs: Vec<std::ops::Range<usize>> = Vec::new();
+    for tap in columns {
+        let first = tap.first as usize;
+        match runs.last_mut() {
+            _ if tap.by != 0.0 => return None,
+            Some(run) if run.end == first => run.end += 1,
+            _ => runs.push(first..first + 1),
+        }
+    }
+    Some(runs)
+}
+
+fn copy_runs(runs: &[std::ops::Range<usize>], row: &[f32], mut out: &mut [f32]) {
+    for run in runs {
+        let (part, rest) = out.split_at_mut(run.len());
+        part.copy_from_slice(&row[run.clone()]);
+        out = rest;
+    }
+}
+
 /// A row of a map that does not rotate.
 #[inline(always)]
 fn straight_row(
@@ -147,18 +176,6 @@ fn straight_row(
     first: bool,
     out: &mut [f32],
 ) {
-    // Texels on texels: runs of the tile's row, as when a level of the tile is as fine as the map.
-    if by == 0.0 && weight == 1.0 && columns.iter().all(|tap| tap.by == 0.0) {
-        let mut x = 0;
-        while x < columns.len() {
-            let start = columns[x].first as usize;
-            let longest = (columns.len() - x).min(upper.len() - start);
-            let run = (1..longest).find(|&i| columns[x + i].first as usize != start + i).unwrap_or(longest);
-            out[x..x + run].copy_from_slice(&upper[start..start + run]);
-            x += run;
-        }
-        return;
-    }
     for (out, tap) in out.iter_mut().zip(columns) {
         let mix = |row: &[f32]| {
             let (a, b) = (row[tap.first as usize], row[tap.second as usize]);

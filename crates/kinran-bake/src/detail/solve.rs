@@ -5,9 +5,9 @@ use kinran_image::{
     Channels, Encoding, Error, Format, Image, Level, Pixels, Texture, Transfer, decode, encode,
 };
 use kinran_shading::detail::{
-    detail_from_texel, detail_over, detail_over_inverse, overlay, overlay_color, overlay_inverse,
-    overlay_slope, rnm, rnm_inverse, smooth_overlay, smooth_overlay_color, smooth_overlay_inverse,
-    smooth_overlay_slope,
+    detail_from_texel, detail_over, detail_over_inverse, overlay_color, overlay_inverse, overlay_slope, rnm,
+    rnm_inverse, smooth_overlay_color, smooth_overlay_inverse, smooth_overlay_inverse_end,
+    smooth_overlay_inverse_start, smooth_overlay_inverse_step, smooth_overlay_slope,
 };
 use kinran_shading::normal_from_xy;
 use rayon::prelude::*;
@@ -30,11 +30,24 @@ pub enum Blend {
     Plain,
 }
 
-/// An overlay, its inverse and its slope.
+/// The inverse of a blend and its slope.
+#[allow(
+    clippy::needless_range_loop,
+    reason = "loops over lanes of known length are what compilers vectorise"
+)]
 pub(crate) trait Operator: Copy {
-    fn blend(self, s: f32, d: f32) -> f32;
     fn inverse(self, t: f32, d: f32) -> f32;
     fn slope(self, s: f32, d: f32) -> f32;
+
+    /// The inverse of a run.
+    #[inline(always)]
+    fn inverse_run(self, t: &[f32; RUN], d: &[f32; RUN]) -> [f32; RUN] {
+        let mut s = [0.0; RUN];
+        for i in 0..RUN {
+            s[i] = self.inverse(t[i], d[i]);
+        }
+        s
+    }
 }
 
 /// The talk's.
@@ -51,10 +64,6 @@ pub(crate) struct Over(pub(crate) f32);
 
 impl Operator for Over {
     #[inline(always)]
-    fn blend(self, s: f32, d: f32) -> f32 {
-        s + (d - s) * self.0
-    }
-    #[inline(always)]
     fn inverse(self, t: f32, d: f32) -> f32 {
         if self.0 < 1.0 { (d + (t - d) / (1.0 - self.0)).clamp(0.0, 1.0) } else { t }
     }
@@ -64,14 +73,28 @@ impl Operator for Over {
     }
 }
 
+#[allow(
+    clippy::needless_range_loop,
+    reason = "loops over lanes of known length are what compilers vectorise"
+)]
 impl Operator for Smooth {
-    #[inline(always)]
-    fn blend(self, s: f32, d: f32) -> f32 {
-        smooth_overlay(s, d)
-    }
     #[inline(always)]
     fn inverse(self, t: f32, d: f32) -> f32 {
         smooth_overlay_inverse(t, d)
+    }
+    #[inline(always)]
+    fn inverse_run(self, t: &[f32; RUN], d: &[f32; RUN]) -> [f32; RUN] {
+        let mut x = [0.0; RUN];
+        for i in 0..RUN {
+            x[i] = smooth_overlay_inverse_start(t[i], d[i]);
+        }
+        for i in 0..RUN {
+            x[i] = smooth_overlay_inverse_step(x[i], t[i], d[i]);
+        }
+        for i in 0..RUN {
+            x[i] = smooth_overlay_inverse_end(x[i], t[i], d[i]);
+        }
+        x
     }
     #[inline(always)]
     fn slope(self, s: f32, d: f32) -> f32 {
@@ -80,10 +103,6 @@ impl Operator for Smooth {
 }
 
 impl Operator for Plain {
-    #[inline(always)]
-    fn blend(self, s: f32, d: f32) -> f32 {
-        overlay(s, d)
-    }
     #[inline(always)]
     fn inverse(self, t: f32, d: f32) -> f32 {
         overlay_inverse(t, d)
@@ -103,8 +122,13 @@ pub struct DetailOptions {
     pub aniso_alpha: f32,
     /// Solves against the tiles as the GPU decodes them, below the finest level. Off: against the tiles as authored.
     pub compensate: bool,
-    /// Chooses among blocks of `s` by the error of the blended result: BC1 of colour and data. Off: keeps what the
-    /// encoder made.
+    /// How much of what the tiles' compression did is taken back where blocks of the finest level are chosen, 0 to 1.
+    /// That level is seen once at its own size, against the level of the tile that it could be solved against, and
+    /// magnified against many finer ones, whose losses are others. At 0 it is solved against the tiles as authored, as
+    /// in the talk.
+    pub finest_compensation: f32,
+    /// Chooses among blocks of `s` by the error of the blended result: BC1, BC4, BC5 and BC7, of targets without alpha.
+    /// Off: keeps what the encoder made, and solves the finest level as in the talk.
     pub choose: bool,
     /// How `s` is compressed.
     pub encoding: Encoding,
@@ -117,6 +141,10 @@ pub struct DetailOptions {
     pub first_level: usize,
 }
 
+/// Half: a quarter of the tile's squared loss is left where the map is seen at its own size, and a quarter of it comes in
+/// as noise where the map is magnified, which bilinear weights of 1/4 and 3/4 bring down to a tenth (`(5/8)²` of it).
+const FINEST_COMPENSATION: f32 = 0.5;
+
 impl DetailOptions {
     /// Everything that lowers the error, at the target's own resolution; the aniso detail half opaque.
     pub fn new(encoding: Encoding) -> Self {
@@ -124,6 +152,7 @@ impl DetailOptions {
             blend: Blend::Smooth,
             aniso_alpha: 0.5,
             compensate: true,
+            finest_compensation: FINEST_COMPENSATION,
             choose: true,
             encoding,
             transfer: None,
@@ -274,8 +303,12 @@ pub(crate) fn solve_levels(
     let mut levels = Vec::new();
     let mut errors = Vec::new();
     for level in range {
-        let compensated = options.compensate && level > options.first_level;
-        let (data, error) = solve_level(target, layers, options, level, (compensated, transfer), progress)?;
+        let compensation = match (options.compensate, level > options.first_level) {
+            (false, _) => 0.0,
+            (true, false) => options.finest_compensation,
+            (true, true) => 1.0,
+        };
+        let (data, error) = solve_level(target, layers, options, level, (compensation, transfer), progress)?;
         let (width, height) = (target.levels[level].width, target.levels[level].height);
         levels.push(Level { width, height, data });
         errors.push(error);
@@ -283,8 +316,9 @@ pub(crate) fn solve_levels(
     Ok(Solved { texture: texture(options.encoding.format, transfer, levels), levels: errors })
 }
 
-/// The texels of one level of `s` before compression, RGBA of 8 bits as [`Solved::texture`] stores them, on the calling
-/// thread alone: solved against the tiles as the GPU decodes them, and linear unless `options.transfer` asks for sRGB.
+/// Sets `rgba8` to the texels of one level of `s` before compression, RGBA of 8 bits as [`Solved::texture`] stores them,
+/// on the calling thread alone: solved against the tiles as the GPU decodes them, and linear unless `options.transfer`
+/// asks for sRGB.
 ///
 /// # Errors
 /// As [`solve`].
@@ -293,7 +327,8 @@ pub fn synthesize(
     layers: &[Layer],
     options: &DetailOptions,
     level: usize,
-) -> Result<Vec<u8>, Error> {
+    rgba8: &mut Vec<u8>,
+) -> Result<(), Error> {
     check_layers(layers, target.kind)?;
     let Some(planes) = target.levels.get(level) else {
         return Err(Error::Unsupported(format!("the target has no level {level}")));
@@ -302,14 +337,14 @@ pub fn synthesize(
     let rows = DetailRows::new(layers, target.kind, (planes.width, planes.height), Seen::Decoded);
     let (mut room, mut detail) = (RowRoom::default(), <[Vec<f32>; 3]>::default());
     let srgb = target.kind == MapKind::Color && options.transfer == Some(Transfer::Srgb);
-    let mut rgba8 = vec![0; width * planes.height as usize * 4];
+    rgba8.resize(width * planes.height as usize * 4, 0);
     for (y, out) in rgba8.chunks_exact_mut(width * 4).enumerate() {
         rows.row(y, &mut room, &mut detail);
         let target_row = std::array::from_fn(|c| planes.row(c, y));
-        let row = SolveRow { target: target_row, detail: &detail, kind: target.kind, srgb, options, out };
+        let row = SolveRow { row: target_row, detail: &detail, target, srgb, options, out };
         pulp::Arch::new().dispatch(row);
     }
-    Ok(rgba8)
+    Ok(())
 }
 
 /// Levels below the finest where both ways to store colour are tried: a 64th of the texels.
@@ -326,7 +361,8 @@ fn better_transfer(target: &Target, layers: &[Layer], options: &DetailOptions) -
     let level = (options.first_level + TRIAL_LEVEL).min(target.levels.len() - 1);
     let error = |transfer| -> Result<f32, Error> {
         let options = &DetailOptions { measure_all: true, ..*options };
-        Ok(solve_level(target, layers, options, level, (options.compensate, transfer), &|_| {})?.1.error)
+        let compensation = if options.compensate { 1.0 } else { 0.0 };
+        Ok(solve_level(target, layers, options, level, (compensation, transfer), &|_| {})?.1.error)
     };
     let (linear, srgb) = (error(Transfer::Linear)?, error(Transfer::Srgb)?);
     Ok(if srgb < linear { Transfer::Srgb } else { Transfer::Linear })
@@ -337,21 +373,22 @@ fn solve_level(
     layers: &[Layer],
     options: &DetailOptions,
     level: usize,
-    (compensated, transfer): (bool, Transfer),
+    (compensation, transfer): (f32, Transfer),
     progress: &(impl Fn(u64) + Sync),
 ) -> Result<(Vec<u8>, LevelError), Error> {
     let planes = &target.levels[level];
     let (width, height) = (planes.width, planes.height);
     let decoded = DetailRows::new(layers, target.kind, (width, height), Seen::Decoded);
     let authored =
-        (!compensated).then(|| DetailRows::new(layers, target.kind, (width, height), Seen::Authored));
+        (compensation < 1.0).then(|| DetailRows::new(layers, target.kind, (width, height), Seen::Authored));
     let bands: Vec<Result<(Vec<u8>, Sums), Error>> = (0..height as usize)
         .into_par_iter()
         .step_by(BAND)
         .map_init(RowRoom::default, |room, y0| {
             let rows = BAND.min(height as usize - y0);
             let srgb = transfer == Transfer::Srgb;
-            let mut band = Band { planes, target, options, srgb, y0, rows, sums: Sums::default() };
+            let mut band =
+                Band { planes, target, options, compensation, srgb, y0, rows, sums: Sums::default() };
             let result = band.solve(&decoded, authored.as_ref(), room);
             progress(u64::from(width) * rows as u64);
             result
@@ -371,6 +408,7 @@ struct Band<'a> {
     planes: &'a Planes,
     target: &'a Target,
     options: &'a DetailOptions,
+    compensation: f32,
     srgb: bool,
     y0: usize,
     rows: usize,
@@ -385,21 +423,29 @@ impl Band<'_> {
         room: &mut RowRoom,
     ) -> Result<(Vec<u8>, Sums), Error> {
         let width = self.planes.width as usize;
+        let format = self.options.encoding.format;
+        let chosen = self.options.choose && !self.target.alpha && can_choose(format, self.target.kind);
+        // Overlay reaches every target, so that blocks made from the start need no texels before.
+        let own = chosen && makes_its_own(format) && self.target.kind != MapKind::Aniso;
         let mut seen: Vec<[Vec<f32>; 3]> = vec![<[Vec<f32>; 3]>::default(); self.rows];
         let mut before = if authored.is_some() { seen.clone() } else { Vec::new() };
-        let mut rgba8 = vec![0; self.rows * width * 4];
-        for (i, out) in rgba8.chunks_exact_mut(width * 4).enumerate() {
+        let mut rgba8 = vec![0; if own { 0 } else { self.rows * width * 4 }];
+        for i in 0..self.rows {
             let y = self.y0 + i;
             decoded.row(y, room, &mut seen[i]);
             if let Some(authored) = authored {
                 authored.row(y, room, &mut before[i]);
+                if chosen && self.compensation > 0.0 {
+                    mix(&mut before[i], &seen[i], self.compensation, self.target.kind);
+                }
             }
-            let against = if authored.is_some() { &before[i] } else { &seen[i] };
-            self.solve_row(std::array::from_fn(|c| self.planes.row(c, y)), against, out);
+            if !own {
+                let against = if authored.is_some() { &before[i] } else { &seen[i] };
+                let out = &mut rgba8[i * width * 4..][..width * 4];
+                self.solve_row(std::array::from_fn(|c| self.planes.row(c, y)), against, out);
+            }
         }
-        let format = self.options.encoding.format;
-        let chosen = self.options.choose && !self.target.alpha && can_choose(format, self.target.kind);
-        let mut blocks = if chosen && makes_its_own(format) {
+        let mut blocks = if own {
             vec![0; format.level_bytes(width as u32, self.rows as u32)]
         } else {
             encode(self.options.encoding, &rgba8, width as u32, self.rows as u32)?
@@ -431,8 +477,14 @@ impl Band<'_> {
     }
 
     fn solve_row(&mut self, target: [&[f32]; 4], detail: &[Vec<f32>; 3], out: &mut [u8]) {
-        let row =
-            SolveRow { target, detail, kind: self.target.kind, srgb: self.srgb, options: self.options, out };
+        let row = SolveRow {
+            row: target,
+            detail,
+            target: self.target,
+            srgb: self.srgb,
+            options: self.options,
+            out,
+        };
         self.sums.unreached += pulp::Arch::new().dispatch(row);
     }
 
@@ -455,6 +507,21 @@ impl Band<'_> {
         }
         self.sums.texels += (width * self.rows) as u64;
         Ok(())
+    }
+}
+
+/// Moves a row of one detail towards another.
+fn mix(row: &mut [Vec<f32>; 3], towards: &[Vec<f32>; 3], by: f32, kind: MapKind) {
+    for (row, towards) in row.iter_mut().zip(towards) {
+        for (v, t) in row.iter_mut().zip(towards) {
+            *v += (t - *v) * by;
+        }
+    }
+    if kind == MapKind::Normal {
+        let [x, y, z] = row;
+        for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+            (*x, *y, *z) = vec3(*x, *y, *z).normalize_or(Vec3::Z).into();
+        }
     }
 }
 
@@ -552,9 +619,9 @@ impl Sums {
 
 /// One row, as a unit that is compiled once for each instruction set. Returns how many texels cannot be reached.
 struct SolveRow<'a> {
-    target: [&'a [f32]; 4],
+    row: [&'a [f32]; 4],
     detail: &'a [Vec<f32>; 3],
-    kind: MapKind,
+    target: &'a Target,
     srgb: bool,
     options: &'a DetailOptions,
     out: &'a mut [u8],
@@ -565,19 +632,19 @@ impl pulp::WithSimd for SolveRow<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> u64 {
-        let SolveRow { target, detail, kind, srgb, options, out } = self;
-        match kind {
+        let SolveRow { row, detail, target, srgb, options, out } = self;
+        match target.kind {
             MapKind::Color | MapKind::Data => {
                 match options.blend {
-                    Blend::Smooth => overlay_rows(target, detail, srgb, Smooth, out),
-                    Blend::Plain => overlay_rows(target, detail, srgb, Plain, out),
+                    Blend::Smooth => overlay_rows(row, target.alpha, detail, srgb, Smooth, out),
+                    Blend::Plain => overlay_rows(row, target.alpha, detail, srgb, Plain, out),
                 }
                 0
             }
             MapKind::Normal => {
                 let mut unreached = 0;
                 for (x, out) in out.chunks_exact_mut(4).enumerate() {
-                    let t = normal_from_xy(target[0][x], target[1][x]);
+                    let t = normal_from_xy(row[0][x], row[1][x]);
                     let s = rnm_inverse(t, vec3(detail[0][x], detail[1][x], detail[2][x]));
                     unreached += u64::from(s.z == 0.0);
                     let byte = |v: f32| synthesized_byte(v * 0.5 + 0.5);
@@ -588,7 +655,7 @@ impl pulp::WithSimd for SolveRow<'_> {
             MapKind::Aniso => {
                 let mut unreached = 0;
                 for (x, out) in out.chunks_exact_mut(4).enumerate() {
-                    let t = vec3(target[0][x], target[1][x], target[2][x]);
+                    let t = vec3(row[0][x], row[1][x], row[2][x]);
                     let d = vec3(detail[0][x], detail[1][x], detail[2][x]);
                     let s = detail_over_inverse(t, d, options.aniso_alpha);
                     let missed = detail_over(s, d, options.aniso_alpha) - t;
@@ -610,7 +677,7 @@ fn synthesized_byte(s: f32) -> u8 {
 }
 
 /// Texels solved at a time: loops of known length are what compilers vectorise.
-const RUN: usize = 64;
+pub(crate) const RUN: usize = 64;
 
 #[inline(always)]
 #[allow(
@@ -619,6 +686,7 @@ const RUN: usize = 64;
 )]
 fn overlay_rows(
     target: [&[f32]; 4],
+    alpha: bool,
     detail: &[Vec<f32>; 3],
     srgb: bool,
     operator: impl Operator,
@@ -630,9 +698,9 @@ fn overlay_rows(
         let mut texels = [0_u32; RUN];
         for channel in 0..3 {
             let (t, d) = (run_of(target[channel], x0), run_of(&detail[channel], x0));
-            let mut stored = [0.0; RUN];
+            let mut stored = operator.inverse_run(&t, &d);
             for i in 0..RUN {
-                stored[i] = operator.inverse(t[i], d[i]) * 254.0 + 1.0;
+                stored[i] = stored[i] * 254.0 + 1.0;
             }
             // Apart from the solution: codes are looked up, which does not run in lanes.
             if srgb {
@@ -646,7 +714,8 @@ fn overlay_rows(
                 }
             }
         }
-        let alpha = run_of(target[3], x0);
+        // Planes of ones need not be read.
+        let alpha = if alpha { run_of(target[3], x0) } else { [1.0; RUN] };
         for i in 0..RUN {
             texels[i] |= rounded(alpha[i] * 255.0) << 24;
         }
@@ -658,7 +727,7 @@ fn overlay_rows(
 
 /// A run from `x0` on; beyond the row's end there are zeros.
 #[inline(always)]
-fn run_of(row: &[f32], x0: usize) -> [f32; RUN] {
+pub(crate) fn run_of(row: &[f32], x0: usize) -> [f32; RUN] {
     match row[x0..].first_chunk() {
         Some(run) => *run,
         None => {

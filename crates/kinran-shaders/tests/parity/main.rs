@@ -113,11 +113,14 @@ fn no_shader_function_is_without_a_parity_test() {
 fn no_rust_function_is_without_a_shader_twin() {
     // Only the baker asks for these: quadrature points of the maximum-likelihood fit, and what solves for detail maps,
     // where columns of skin's table stand.
-    const BAKER_ONLY: [&str; 8] = [
+    const BAKER_ONLY: [&str; 11] = [
         "microfacet_basis",
         "overlay_inverse",
         "overlay_slope",
         "smooth_overlay_inverse",
+        "smooth_overlay_inverse_start",
+        "smooth_overlay_inverse_step",
+        "smooth_overlay_inverse_end",
         "smooth_overlay_slope",
         "rnm_inverse",
         "detail_over_inverse",

@@ -25,5 +25,6 @@ pub use normal::{rnm, rnm_inverse};
 pub use over::{detail_over, detail_over_inverse};
 pub use overlay::{
     overlay, overlay_color, overlay_inverse, overlay_slope, smooth_overlay, smooth_overlay_color,
-    smooth_overlay_inverse, smooth_overlay_slope,
+    smooth_overlay_inverse, smooth_overlay_inverse_end, smooth_overlay_inverse_start,
+    smooth_overlay_inverse_step, smooth_overlay_slope,
 };

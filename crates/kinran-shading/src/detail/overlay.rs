@@ -77,23 +77,35 @@ pub fn smooth_overlay_color(s: Vec3, d: Vec3) -> Vec3 {
 /// `d x + a x²/2 + a x³/2 = e` in [0, 1]. The start has x² for x³, which lies below the root; two of Halley's steps
 /// reach single precision for every d and t. (In `s` the cubic `4a s³ - 4a s² + s - t` cancels near d = 0, and has three
 /// real roots for d < 1/8.) The last step shares its division with [`overlay_inverse`].
+///
+/// It has three parts, for whoever solves many: each division waits for the one before, and one after another for all
+/// texels, parts of different texels overlap, where a processor does not look as far ahead as to the next whole.
 #[inline(always)]
 pub fn smooth_overlay_inverse(t: f32, d: f32) -> f32 {
-    let (a, e) = (1.0 - 2.0 * d, t - d);
-    // Numerator and denominator of what Halley's step takes off.
-    let step = |x: f32| {
-        let excess = x * (d + 0.5 * a * x * (1.0 + x)) - e;
-        let slope = d + a * x * (1.0 + 1.5 * x);
-        let curvature = a * (1.0 + 3.0 * x);
-        (excess * slope, slope * slope - 0.5 * excess * curvature)
-    };
-    let start = 2.0 * e / larger(d + sqrt(larger(d * d + 4.0 * a * e, 0.0)), TINY);
-    let (part, whole) = step(start);
-    let x = start - part / larger(whole, TINY);
+    let x = smooth_overlay_inverse_start(t, d);
+    smooth_overlay_inverse_end(smooth_overlay_inverse_step(x, t, d), t, d)
+}
 
-    // Everything is computed, then chosen: so a loop over texels runs in lanes.
+/// The start of [`smooth_overlay_inverse`]: an `x` that is right to a third where d < 1/2 and t ≥ d, and not used elsewhere.
+#[inline(always)]
+pub fn smooth_overlay_inverse_start(t: f32, d: f32) -> f32 {
+    let (a, e) = (1.0 - 2.0 * d, t - d);
+    2.0 * e / larger(d + sqrt(larger(d * d + 4.0 * a * e, 0.0)), TINY)
+}
+
+/// One step of [`smooth_overlay_inverse`] from `x` on.
+#[inline(always)]
+pub fn smooth_overlay_inverse_step(x: f32, t: f32, d: f32) -> f32 {
+    let (part, whole) = halley(x, t, d);
+    x - part / larger(whole, TINY)
+}
+
+/// The last step of [`smooth_overlay_inverse`], and what it is where the overlay is plain. Everything is computed, then
+/// chosen: so a loop over texels runs in lanes.
+#[inline(always)]
+pub fn smooth_overlay_inverse_end(x: f32, t: f32, d: f32) -> f32 {
     let (darker, curved) = (t < d, (t >= d) & (d < 0.5));
-    let (step_part, step_whole) = step(x);
+    let (step_part, step_whole) = halley(x, t, d);
     let plain_part = if darker { t } else { 1.0 - t };
     let plain_whole = 2.0 * if darker { d } else { 1.0 - d };
     let part = if curved { step_part } else { plain_part };
@@ -102,6 +114,17 @@ pub fn smooth_overlay_inverse(t: f32, d: f32) -> f32 {
     let brighter = if d >= 1.0 { 0.5 } else { 1.0 - quotient };
     let plain = if darker { quotient } else { brighter };
     if curved { 0.5 + 0.5 * (x - quotient) } else { plain }
+}
+
+/// Numerator and denominator of what Halley's step takes off `x`.
+#[inline(always)]
+fn halley(x: f32, t: f32, d: f32) -> (f32, f32) {
+    let (a, e) = (1.0 - 2.0 * d, t - d);
+    let (ax, axx) = (a * x, a * x * x);
+    let excess = x * (d + 0.5 * (ax + axx)) - e;
+    let slope = d + ax + 1.5 * axx;
+    let curvature = a + 3.0 * ax;
+    (excess * slope, slope * slope - 0.5 * excess * curvature)
 }
 
 /// The larger of two numbers that are none but numbers: one instruction, where `f32::max` takes four.

@@ -1,14 +1,21 @@
 //! `kinran detail report`: a whole library of materials, in the manner of the talk's table.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::Vec2;
+use kinran_bake::aniso::{
+    Filter, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps, SurfaceOptions,
+    bake_surface,
+};
 use kinran_bake::detail::{
     Comparison, DetailOptions, Layer, LayerTransform, MapKind, Mask, Paint, PaintGuides, Target, Tile,
     TileOptions, bearable_opacity, compare, level_pictures,
 };
 use kinran_bake::folder::{Green, Role, named_maps};
-use kinran_image::{Channels, Encoding, Image, Pixels, encode_png, read_image, write_atomically};
+use kinran_image::{Channels, Encoding, Image, Level, Pixels, encode_png, read_image, write_atomically};
+use kinran_scene::Wrap;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{BlockFormat, KindName, page};
@@ -20,10 +27,11 @@ use crate::{Console, Error};
 ///
 /// FOLDER holds a folder for each material, with maps named as exporters name them. Every target is painted (grime by
 /// occlusion and in cavities, rubbed edges, large-scale colour) over its material and a second one in patches, tiled at
-/// twice the target's density, and solved twice: "own" against the tiles it was painted over, as in the talk, and "other"
-/// against the one tile of all other materials that is nearest in its colours; with --fade a third time, "faded", where
-/// that tile has the largest opacity with which the result is no worse than the compressed target. Numbers are those of
-/// the second mip, as in the talk, and of the first.
+/// twice the target's density, and solved three times: "own" against the tiles it was painted over, as in the talk;
+/// "other" against the one tile of all other materials that is nearest in its colours, which has nothing to do with the
+/// target; "faded" against the same at the largest opacity with which the result is no worse than the compressed target.
+/// Numbers are those of the second mip, as in the talk, and of the first. Aniso maps are made of normals and roughness
+/// where a material has none.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran detail report materials/ -o report/
@@ -54,9 +62,9 @@ pub struct LibraryArgs {
     #[arg(long)]
     pub center: bool,
 
-    /// Also solve against the other tile faded until the result is no worse than the compressed target
+    /// No third solution, against the other tile faded until the result is no worse than the compressed target
     #[arg(long)]
-    pub fade: bool,
+    pub no_fade: bool,
 
     /// No pictures, numbers only
     #[arg(long)]
@@ -165,6 +173,10 @@ pub struct LibraryMean {
     pub uncompensated: f32,
     /// How many of the blended are no worse than the compressed target.
     pub no_worse: usize,
+    /// Of the finest level: with everything and by the talk's method where it is magnified twice, see
+    /// [`MagnifiedComparison`](kinran_bake::detail::MagnifiedComparison).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub magnified: Option<[f32; 2]>,
 }
 
 /// The whole report.
@@ -189,7 +201,7 @@ pub(super) fn run(args: &LibraryArgs, console: &Console) -> Result<(), Error> {
 /// # Errors
 /// The folder has no materials with maps of the kinds asked for, a map cannot be read, or the output cannot be written.
 pub fn report_library(args: &LibraryArgs, console: &Console) -> Result<LibraryReport, Error> {
-    let materials = read_materials(args)?;
+    let materials = read_materials(args, console)?;
     let formats =
         if args.format.is_empty() { vec![BlockFormat::Bc1, BlockFormat::Bc7] } else { args.format.clone() };
     let pictures = args.output.join("pictures");
@@ -325,9 +337,9 @@ fn solve_map(
         let (layer, name) = (layer_of(&tile, args.size), vec![materials[near].name.clone()]);
         solve(&[layer], name.clone(), Against::Other)?;
         // An aniso map has an opacity of its own.
-        if args.fade
+        if !args.no_fade
             && map.kind != MapKind::Aniso
-            && let Some(opacity) = bearable_opacity(&target, &[layer], &options)?
+            && let Some(opacity) = bearable_opacity(&target, &[layer], &options, &|_| {})?
         {
             solve(&[Layer { opacity, ..layer }], name, Against::Faded)?;
         }
@@ -395,7 +407,8 @@ fn crop(image: &Image, side: u32) -> Result<Image, Error> {
     Ok(Image::new(w, h, image.channels, Pixels::U8(rows.collect()))?)
 }
 
-fn read_materials(args: &LibraryArgs) -> Result<Vec<Material>, Error> {
+/// The materials of a folder that have a map to paint over, in the order of their names.
+fn read_materials(args: &LibraryArgs, console: &Console) -> Result<Vec<Material>, Error> {
     let io = |e| kinran_image::Error::io(&args.folder, e);
     let mut folders: Vec<PathBuf> = std::fs::read_dir(&args.folder)
         .map_err(io)?
@@ -403,32 +416,19 @@ fn read_materials(args: &LibraryArgs) -> Result<Vec<Material>, Error> {
         .collect::<Result<_, _>>()?;
     folders.retain(|folder| folder.is_dir());
     folders.sort();
-    let mut materials = Vec::new();
-    for folder in folders {
-        let mut maps: Vec<MapFile> = Vec::new();
-        for (file, role, green) in named_maps(&folder)? {
-            let kind = match role {
-                Role::Color => MapKind::Color,
-                Role::Normal => MapKind::Normal,
-                Role::Roughness | Role::Gloss | Role::Occlusion | Role::Metallic | Role::Specular => {
-                    MapKind::Data
-                }
-                Role::Aniso => MapKind::Aniso,
-                Role::Height => MapKind::Data,
-                _ => continue,
-            };
-            let guide = matches!(role, Role::Height | Role::Occlusion);
-            if maps.iter().any(|map| map.role == role) || !(guide || args.wants(kind)) {
-                continue;
-            }
-            let y_down = green == Some(Green::Down);
-            maps.push(MapFile { role, kind, y_down, image: read_image(&file)? });
-        }
-        if maps.iter().any(|map| map.is_target(args)) {
+    let stage = console.progress().stage("reading maps", folders.len() as u64);
+    let materials: Vec<Option<Material>> = folders
+        .par_iter()
+        .map(|folder| {
+            let maps = read_maps(folder, args);
+            stage.add(1);
+            let maps = maps?;
             let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            materials.push(Material { name, maps });
-        }
-    }
+            Ok(maps.iter().any(|map| map.is_target(args)).then_some(Material { name, maps }))
+        })
+        .collect::<Result<_, Error>>()?;
+    drop(stage);
+    let materials: Vec<Material> = materials.into_iter().flatten().collect();
     if materials.is_empty() {
         return Err(Error::Usage(format!(
             "{}: there is no folder with maps in it; give a folder of folders with maps named as color, normal, \
@@ -437,6 +437,54 @@ fn read_materials(args: &LibraryArgs) -> Result<Vec<Material>, Error> {
         )));
     }
     Ok(materials)
+}
+
+/// The maps of a material that are painted over or painted by.
+fn read_maps(folder: &Path, args: &LibraryArgs) -> Result<Vec<MapFile>, Error> {
+    let mut maps: Vec<MapFile> = Vec::new();
+    for (file, role, green) in named_maps(folder)? {
+        let kind = match role {
+            Role::Color => MapKind::Color,
+            Role::Normal => MapKind::Normal,
+            Role::Roughness | Role::Gloss | Role::Occlusion | Role::Metallic | Role::Specular => {
+                MapKind::Data
+            }
+            Role::Aniso => MapKind::Aniso,
+            Role::Height => MapKind::Data,
+            _ => continue,
+        };
+        let guide = matches!(role, Role::Height | Role::Occlusion);
+        // An aniso map is made from these, where there is none.
+        let source = args.wants(MapKind::Aniso) && matches!(role, Role::Normal | Role::Roughness);
+        if maps.iter().any(|map| map.role == role) || !(guide || source || args.wants(kind)) {
+            continue;
+        }
+        let y_down = green == Some(Green::Down);
+        maps.push(MapFile { role, kind, y_down, image: read_image(&file)? });
+    }
+    if args.wants(MapKind::Aniso) && !maps.iter().any(|map| map.role == Role::Aniso) {
+        maps.extend(aniso_map(&maps)?);
+    }
+    Ok(maps)
+}
+
+/// An aniso map of half the size, filtered from normals and roughness: where normals lie along grooves or threads, four
+/// of them together are anisotropic.
+fn aniso_map(maps: &[MapFile]) -> Result<Option<MapFile>, Error> {
+    let map = |role: Role| maps.iter().find(|map| map.role == role);
+    let (Some(normal), Some(roughness)) = (map(Role::Normal), map(Role::Roughness)) else { return Ok(None) };
+    let surface = SurfaceMaps {
+        normal: NormalMap::new(Arc::new(normal.image.clone()), normal.y_down),
+        roughness: RoughnessMaps::Isotropic(ScalarMap::channel(Arc::new(roughness.image.clone()), 0)),
+        wrap: [Wrap::Repeat; 2],
+    };
+    let request =
+        SheetRequest { sheet: Sheet::Aniso, encoding: BlockFormat::Rgba8.encoding(), packed_with: None };
+    let options = SurfaceOptions { filter: Filter::Linear, ..SurfaceOptions::default() };
+    let baked = bake_surface(&surface, options, &[request], &|_| {})?;
+    let Some(Level { width, height, data }) = baked.textures[0].levels.get(1) else { return Ok(None) };
+    let image = Image::new(*width, *height, Channels::Rgba, Pixels::U8(data.clone()))?;
+    Ok(Some(MapFile { role: Role::Aniso, kind: MapKind::Aniso, y_down: false, image }))
 }
 
 fn means(rows: &[LibraryRow]) -> Vec<LibraryMean> {
@@ -476,6 +524,12 @@ fn means(rows: &[LibraryRow]) -> Vec<LibraryMean> {
                 plain_overlay: mean(&|e| e.plain_overlay),
                 uncompensated: mean(&|e| e.uncompensated),
                 no_worse: no_worse.count(),
+                magnified: (level == 0).then(|| {
+                    let mean = |of: &dyn Fn(&Comparison) -> f32| {
+                        rows.iter().map(|row| of(&row.comparison)).sum::<f32>() / rows.len() as f32
+                    };
+                    [mean(&|c| c.magnified.blended), mean(&|c| c.magnified.talk)]
+                }),
             }
         })
         .collect()
@@ -496,6 +550,7 @@ fn text(report: &LibraryReport) -> String {
             "plain overlay",
             "uncompensated",
             "no worse",
+            "magnified (talk)",
         ]
         .map(String::from)
         .to_vec(),

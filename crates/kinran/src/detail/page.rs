@@ -26,7 +26,7 @@ figure { margin: 0; } figcaption { color: var(--faint); font-size: .8rem; } img 
 ";
 
 /// A mean as a row of cells.
-pub(super) fn cells(mean: &LibraryMean) -> [String; 12] {
+pub(super) fn cells(mean: &LibraryMean) -> [String; 13] {
     [
         mean.map.clone(),
         mean.format.clone(),
@@ -40,6 +40,7 @@ pub(super) fn cells(mean: &LibraryMean) -> [String; 12] {
         format!("{:.3}", mean.plain_overlay),
         format!("{:.3}", mean.uncompensated),
         format!("{} of {}", mean.no_worse, mean.count),
+        mean.magnified.map_or(String::new(), |[blended, talk]| format!("{blended:.3} ({talk:.3})")),
     ]
 }
 
@@ -58,6 +59,7 @@ pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
         "plain overlay",
         "uncompensated",
         "no worse",
+        "magnified (the talk's)",
     ];
     let head: String = head.iter().map(|name| format!("<th>{name}")).collect();
     let means: String = report
@@ -77,16 +79,16 @@ pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
             format!("<tr>{cells}\n")
         })
         .collect();
-    let mut shown: Vec<(&str, &str)> = Vec::new();
+    let map_of = |row: &LibraryRow| (row.material.clone(), row.map.clone());
     let sections: String = report
         .rows
         .iter()
-        .map(|row| {
-            let first = !shown.contains(&(&row.material, &row.map));
-            if first {
-                shown.push((&row.material, &row.map));
-            }
-            section(row, first, pictures)
+        .enumerate()
+        .map(|(i, row)| {
+            let before = || report.rows[..i].iter().filter(|other| map_of(other) == map_of(row));
+            // Pictures are of the first format.
+            let pictures = pictures && before().all(|other| other.against != row.against);
+            section(row, before().next().is_none(), pictures)
         })
         .collect();
     let size = report.size;
@@ -102,7 +104,8 @@ pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
 <p>Targets of {size} x {size} texels, painted over tiled materials and solved. Errors are root mean squares in steps of 8
 bits, for normals in degrees, of the second mip and of the first. \"own\": against the tiles the target was painted over;
 \"other\": against the nearest tile of another material; \"faded\": against that at the largest opacity with which the result is
-no worse than the compressed target. Error pictures are 8 times enlarged.</p>
+no worse than the compressed target. \"Magnified\": the first mip at twice its size, against the exact solution over the tiles
+as authored. Error pictures are 8 times enlarged.</p>
 <table>
 <tr>{head}
 {means}</table>
@@ -132,8 +135,7 @@ fn section(row: &LibraryRow, first: bool, pictures: bool) -> String {
         row.comparison.shared_bytes,
         row.comparison.unique_bytes,
     );
-    // Pictures are of the first format.
-    let images: String = if pictures && row.format != "BC7" {
+    let images: String = if pictures {
         PICTURES
             .iter()
             .map(|name| {

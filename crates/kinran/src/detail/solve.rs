@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use glam::vec3;
 use kinran_bake::detail::{
-    Comparison, DetailOptions, Layer, LayerTransform, LevelError, MapKind, Mask, Resolution, Solved, Target,
-    Tile, TileOptions, bearable_opacity, compare, level_pictures, lowest_resolution, solve,
+    Comparison, DetailOptions, FADE_TRIALS, Layer, LayerTransform, LevelError, MapKind, Mask, Resolution,
+    Solved, Target, Tile, TileOptions, bearable_opacity, compare, level_pictures, lowest_resolution, solve,
 };
 use kinran_image::{Image, encode_dds, encode_ktx2, encode_png, read_image, read_texture, write_atomically};
 use serde::Serialize;
@@ -82,7 +82,12 @@ pub struct SolveArgs {
     #[arg(long)]
     pub no_compensation: bool,
 
-    /// Keep the encoder's blocks, whatever they are blended to
+    /// How much of what the tiles' compression did the finest level takes back: 0 as in the talk, 1 as all other levels.
+    /// What it gains at its own size it loses where it is magnified
+    #[arg(long, value_name = "0..1", default_value_t = 0.5, value_parser = |t: &str| number(t, 0.0..=1.0))]
+    pub finest_compensation: f32,
+
+    /// Keep the encoder's blocks, whatever they are blended to, and solve the finest level as in the talk
     #[arg(long)]
     pub no_choice: bool,
 
@@ -181,12 +186,13 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     }
     options.aniso_alpha = args.alpha;
     options.compensate = !args.no_compensation;
+    options.finest_compensation = args.finest_compensation;
     options.choose = !args.no_choice;
     if args.plain_overlay {
         options.blend = kinran_bake::detail::Blend::Plain;
     }
 
-    let tiles = read_tiles(args, kind, args.tile_format.unwrap_or(format))?;
+    let tiles = read_tiles(args, kind, args.tile_format.unwrap_or(format), console)?;
     let tile = |file: &Path, y_down: bool, is_mask: bool| &tiles[&(file.to_path_buf(), y_down, is_mask)];
     let mut layers: Vec<Layer> = args
         .layer
@@ -211,10 +217,13 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     let target =
         named(&args.target, read_image(&args.target).and_then(|i| Target::new(&i, kind, args.y_down)))?;
     let size = (target.levels[0].width, target.levels[0].height);
+    let texels = u64::from(size.0) * u64::from(size.1);
 
     let mut opacity = None;
     if args.fade {
-        let found = bearable_opacity(&target, &layers, &options)?.ok_or_else(|| {
+        // Two levels at a time.
+        let stage = console.progress().stage("fading the layers", FADE_TRIALS * texels * 5 / 4);
+        let found = bearable_opacity(&target, &layers, &options, &|n| stage.add(n))?.ok_or_else(|| {
             Error::Usage(
                 "--fade: even without the layers the error is above that of the compressed target; take a finer --format"
                     .into(),
@@ -223,10 +232,11 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         layers.iter_mut().for_each(|layer| layer.opacity *= found);
         opacity = Some(found);
     }
-    let stage = console.progress().stage("solving", u64::from(size.0) * u64::from(size.1) * 4 / 3);
     let mut resolutions = Vec::new();
     if let Some(bound) = args.max_error {
-        let found = lowest_resolution(&target, &layers, &options, bound)?;
+        // All resolutions together are a third more than the first, and so are the mips of each.
+        let stage = console.progress().stage("trying resolutions", texels * 16 / 9);
+        let found = lowest_resolution(&target, &layers, &options, bound, &|n| stage.add(n))?;
         resolutions = found.resolutions;
         let Some(level) = found.level else {
             return Err(Error::Usage(format!(
@@ -237,13 +247,16 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         };
         options.first_level = level;
     }
+    let finest = &target.levels[options.first_level];
+    let all = u64::from(finest.width) * u64::from(finest.height) * 4 / 3;
     let (solved, comparison) = if args.compare {
-        let (comparison, solved) = compare(&target, &layers, &options, &|n| stage.add(n / 4))?;
+        let stage = console.progress().stage("solving and comparing", 5 * all);
+        let (comparison, solved) = compare(&target, &layers, &options, &|n| stage.add(n))?;
         (solved, Some(comparison))
     } else {
+        let stage = console.progress().stage("solving", all);
         (solve(&target, &layers, &options, &|n| stage.add(n))?, None)
     };
-    drop(stage);
 
     let stem = file_stem(&args.target);
     let mut files = write_textures(args, &stem, &solved, &tiles)?;
@@ -292,7 +305,12 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     Ok(report)
 }
 
-fn read_tiles(args: &SolveArgs, kind: MapKind, format: BlockFormat) -> Result<Tiles, Error> {
+fn read_tiles(
+    args: &SolveArgs,
+    kind: MapKind,
+    format: BlockFormat,
+    console: &Console,
+) -> Result<Tiles, Error> {
     let mut tiles = Tiles::new();
     for flag in &args.layer {
         let mut read = |file: &Path, kind: MapKind, y_down: bool, is_mask: bool| -> Result<(), Error> {
@@ -310,7 +328,11 @@ fn read_tiles(args: &SolveArgs, kind: MapKind, format: BlockFormat) -> Result<Ti
                     center: args.center && !is_mask,
                     ..TileOptions::new(kind, encoding)
                 };
-                read_image(file).and_then(|image| Tile::new(&image, options))
+                read_image(file).and_then(|image| {
+                    let texels = u64::from(image.width) * u64::from(image.height) * 4 / 3;
+                    let stage = console.progress().stage(format!("compressing {}", file_name(file)), texels);
+                    Tile::bake(&image, options, &|n| stage.add(n))
+                })
             };
             tiles.insert(key, named(file, tile)?);
             Ok(())

@@ -1,6 +1,8 @@
 //! BC1: ends on the line of the solution, then least squares and single steps, by the blended error.
 
-use super::{Blending, BlockGoal, Stored, TEXELS, least_squares, lower, sum};
+use pulp::Simd;
+
+use super::{BlockGoal, Lanes, Line, Nearest, TEXELS, lanes_of, least_squares, sum};
 
 /// Shares of the line that are cut off both its ends, to start from.
 const INSETS: [f32; 3] = [0.0, 0.1, 0.25];
@@ -23,60 +25,91 @@ const SHARES: [f32; 4] = [1.0, 0.0, 2.0 / 3.0, 1.0 / 3.0];
 /// The ends in red, green and blue, as the whole numbers that are stored.
 type Ends = [[i32; 2]; 3];
 
-/// Squared differences by channel, colour and texel.
-type Errors = [[[f32; TEXELS]; 4]; 3];
+/// What the four values of each channel make of a detail, by choice and channel.
+type Colors = [[Line; 3]; 4];
+
+/// Lines of all values of a channel, which are thirds of its steps.
+pub(super) struct Thirds {
+    five: [Line; 3 * 31 + 1],
+    six: [Line; 3 * 63 + 1],
+}
+
+impl Thirds {
+    /// From the lines of all bytes: with the 8 bits that decoders round to.
+    #[inline(always)]
+    pub(super) fn new(lines: &[Line; 256]) -> Self {
+        let mut thirds = Thirds { five: [Line::default(); 94], six: [Line::default(); 190] };
+        let byte = |third: usize, largest: f32| (third as f32 * 85.0 / largest + 0.5) as usize;
+        for (third, line) in thirds.five.iter_mut().enumerate() {
+            *line = lines[byte(third, 31.0)];
+        }
+        for (third, line) in thirds.six.iter_mut().enumerate() {
+            *line = lines[byte(third, 63.0)];
+        }
+        thirds
+    }
+
+    /// The four values of a channel.
+    #[inline(always)]
+    fn values(&self, [a, b]: [i32; 2], channel: usize) -> [&Line; 4] {
+        let thirds = if channel == 1 { &self.six[..] } else { &self.five[..] };
+        [3 * a, 3 * b, 2 * a + b, a + 2 * b].map(|third| &thirds[third as usize])
+    }
+
+    #[inline(always)]
+    fn colors(&self, ends: Ends) -> Colors {
+        let mut colors = [[Line::default(); 3]; 4];
+        for c in 0..3 {
+            for (color, value) in colors.iter_mut().zip(self.values(ends[c], c)) {
+                color[c] = *value;
+            }
+        }
+        colors
+    }
+}
 
 /// The block of four colours whose blended result is nearest to the target, as far as it is found: texels take the
 /// colour that is blended nearest to their target; the ends follow by least squares, weighted by the slope of the blend;
 /// then each end takes single steps as long as they help.
 #[inline(always)]
-pub(super) fn choose(goal: &BlockGoal, stored: Stored, blend: Blending) -> [u8; 8] {
-    let [high, low] = goal.line();
-    let (mut ends, mut errors, mut least) = ([[0; 2]; 3], [[[0.0; TEXELS]; 4]; 3], f32::INFINITY);
+pub(super) fn choose<S: Simd>(simd: S, goal: &BlockGoal, thirds: &Thirds) -> [u8; 8] {
+    let [high, low] = goal.line(simd);
+    let (mut ends, mut least) = ([[0; 2]; 3], f32::INFINITY);
     for inset in INSETS {
         let mut start = [[0; 2]; 3];
         for c in 0..3 {
             let by = (high[c] - low[c]) * inset;
             start[c] = [quantize(high[c] - by, c), quantize(low[c] + by, c)];
         }
-        let mut start_errors = errors_of(start, goal, stored, blend);
-        let mut error = total(&start_errors);
+        let (mut error, mut chosen) = nearest(simd, goal, thirds, start);
         for _ in 0..ROUNDS {
-            let fitted = fit(&choices_of(&start_errors), goal);
+            let fitted = fit(simd, &chosen, goal);
             if fitted == start {
                 break;
             }
-            let fitted_errors = errors_of(fitted, goal, stored, blend);
-            let fitted_error = total(&fitted_errors);
+            let (fitted_error, fitted_chosen) = nearest(simd, goal, thirds, fitted);
             if fitted_error >= error {
                 break;
             }
-            (start, start_errors, error) = (fitted, fitted_errors, fitted_error);
+            (start, error, chosen) = (fitted, fitted_error, fitted_chosen);
         }
         if error < least {
-            (ends, errors, least) = (start, start_errors, error);
+            (ends, least) = (start, error);
         }
     }
 
     for _ in 0..SWEEPS {
         let before = least;
         for c in 0..3 {
-            let mut others = [[0.0; TEXELS]; 4];
-            for (choice, others) in others.iter_mut().enumerate() {
-                let (a, b) = (&errors[(c + 1) % 3][choice], &errors[(c + 2) % 3][choice]);
-                for i in 0..TEXELS {
-                    others[i] = a[i] + b[i];
-                }
-            }
+            let others = Others::new(simd, goal, thirds, ends, c);
             for (a, b) in STEPS {
                 let moved = [ends[c][0] + a, ends[c][1] + b];
                 if moved.iter().any(|end| !(0..=LARGEST[c]).contains(end)) {
                     continue;
                 }
-                let of_channel = channel_errors(moved, c, goal, stored, blend);
-                let error = total_with(&of_channel, &others);
+                let error = others.total_with(simd, goal, thirds.values(moved, c), c);
                 if error < least {
-                    (ends[c], errors[c], least) = (moved, of_channel, error);
+                    (ends[c], least) = (moved, error);
                 }
             }
         }
@@ -84,7 +117,14 @@ pub(super) fn choose(goal: &BlockGoal, stored: Stored, blend: Blending) -> [u8; 
             break;
         }
     }
-    pack(ends, &choices_of(&errors))
+    pack(ends, &nearest(simd, goal, thirds, ends).1.choices)
+}
+
+/// What texels choose of the four colours, and the error.
+#[inline(always)]
+fn nearest<S: Simd>(simd: S, goal: &BlockGoal, thirds: &Thirds, ends: Ends) -> (f32, Nearest) {
+    let nearest = goal.nearest(simd, &thirds.colors(ends));
+    (sum(&nearest.errors), nearest)
 }
 
 #[inline(always)]
@@ -92,87 +132,57 @@ fn quantize(v: f32, channel: usize) -> i32 {
     (v.clamp(0.0, 1.0) * LARGEST[channel] as f32 + 0.5) as i32
 }
 
-/// Differences for the four values of a channel, with the 8 bits that decoders round to.
-#[inline(always)]
-fn channel_errors(
-    ends: [i32; 2],
-    channel: usize,
-    goal: &BlockGoal,
-    stored: Stored,
-    blend: Blending,
-) -> [[f32; TEXELS]; 4] {
-    let (a, b) = (ends[0] as f32, ends[1] as f32);
-    let mut errors = [[0.0; TEXELS]; 4];
-    for (errors, share) in errors.iter_mut().zip(SHARES) {
-        let byte = ((b + (a - b) * share) * (255.0 / LARGEST[channel] as f32) + 0.5) as u8;
-        *errors = goal.errors(channel, &[stored.value(byte); TEXELS], blend);
-    }
-    errors
-}
+/// Differences of two channels, by colour and texel.
+struct Others([[f32; TEXELS]; 4]);
 
-#[inline(always)]
-fn errors_of(ends: Ends, goal: &BlockGoal, stored: Stored, blend: Blending) -> Errors {
-    let mut errors = [[[0.0; TEXELS]; 4]; 3];
-    for c in 0..3 {
-        errors[c] = channel_errors(ends[c], c, goal, stored, blend);
-    }
-    errors
-}
-
-/// The error when each texel takes the best of the four colours.
-#[inline(always)]
-fn total(errors: &Errors) -> f32 {
-    let mut others = errors[1];
-    for choice in 0..4 {
-        for i in 0..TEXELS {
-            others[choice][i] += errors[2][choice][i];
+impl Others {
+    /// Those of all channels but one.
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, goal: &BlockGoal, thirds: &Thirds, ends: Ends, but: usize) -> Self {
+        let (a, b) = ((but + 1) % 3, (but + 2) % 3);
+        let (values_a, values_b) = (thirds.values(ends[a], a), thirds.values(ends[b], b));
+        let mut others = [[0.0; TEXELS]; 4];
+        for part in 0..TEXELS / S::F32_LANES {
+            let (lanes_a, lanes_b): (Lanes<S>, Lanes<S>) =
+                (goal.lanes(simd, a, part), goal.lanes(simd, b, part));
+            for (others, (a, b)) in others.iter_mut().zip(values_a.into_iter().zip(values_b)) {
+                let error = simd.add_f32s(lanes_a.error(simd, a), lanes_b.error(simd, b));
+                S::as_mut_simd_f32s(others).0[part] = error;
+            }
         }
+        Others(others)
     }
-    total_with(&errors[0], &others)
-}
 
-#[inline(always)]
-fn total_with(one: &[[f32; TEXELS]; 4], others: &[[f32; TEXELS]; 4]) -> f32 {
-    let mut all = [[0.0; TEXELS]; 4];
-    for choice in 0..4 {
-        for i in 0..TEXELS {
-            all[choice][i] = one[choice][i] + others[choice][i];
+    /// The error when each texel takes the best of the four colours.
+    #[inline(always)]
+    fn total_with<S: Simd>(&self, simd: S, goal: &BlockGoal, values: [&Line; 4], channel: usize) -> f32 {
+        let mut least = [0.0; TEXELS];
+        for (part, least) in S::as_mut_simd_f32s(&mut least).0.iter_mut().enumerate() {
+            let lanes: Lanes<S> = goal.lanes(simd, channel, part);
+            *least = simd.splat_f32s(f32::INFINITY);
+            for (value, others) in values.into_iter().zip(&self.0) {
+                let error = simd.add_f32s(lanes.error(simd, value), lanes_of::<S>(others, part));
+                *least = simd.min_f32s(*least, error);
+            }
         }
+        sum(&least)
     }
-    sum(&lower(&lower(&all[0], &all[1]), &lower(&all[2], &all[3])))
-}
-
-#[inline(always)]
-fn choices_of(errors: &Errors) -> [i32; TEXELS] {
-    let (mut least, mut choices) = ([f32::INFINITY; TEXELS], [0_i32; TEXELS]);
-    for choice in 0..4 {
-        for i in 0..TEXELS {
-            let error = errors[0][choice][i] + (errors[1][choice][i] + errors[2][choice][i]);
-            let better = error < least[i];
-            choices[i] = if better { choice as i32 } else { choices[i] };
-            least[i] = if better { error } else { least[i] };
-        }
-    }
-    choices
 }
 
 /// The ends nearest to the exact solution, given what each texel takes of them.
 #[inline(always)]
-fn fit(choices: &[i32; TEXELS], goal: &BlockGoal) -> Ends {
-    let mut shares = [0.0; TEXELS];
-    for i in 0..TEXELS {
-        shares[i] = SHARES[choices[i] as usize];
-    }
+fn fit<S: Simd>(simd: S, chosen: &Nearest, goal: &BlockGoal) -> Ends {
+    let shares = chosen.choices.map(|choice| SHARES[choice as usize & 3]);
     let mut ends = [[0; 2]; 3];
     for c in 0..3 {
-        let (a, b) = least_squares(&shares, &goal.v[c], &goal.weight[c]);
+        let (a, b) = least_squares(simd, &shares, &goal.v[c], &goal.weight[c]);
         ends[c] = [quantize(a, c), quantize(b, c)];
     }
     ends
 }
 
 #[inline(always)]
-fn pack(ends: Ends, choices: &[i32; TEXELS]) -> [u8; 8] {
+fn pack(ends: Ends, choices: &[u32; TEXELS]) -> [u8; 8] {
     let mut packed: [u16; 2] =
         std::array::from_fn(|i| ((ends[0][i] << 11) | (ends[1][i] << 5) | ends[2][i]) as u16);
     // Four colours take the larger end first; exchanged, the four choices exchange in pairs.
@@ -183,7 +193,7 @@ fn pack(ends: Ends, choices: &[i32; TEXELS]) -> [u8; 8] {
     let all = packed[0] == packed[1];
     let mut bits = 0_u32;
     for (i, &choice) in choices.iter().enumerate() {
-        let choice = if all { 0 } else { choice as u32 ^ u32::from(exchange) };
+        let choice = if all { 0 } else { choice ^ u32::from(exchange) };
         bits |= choice << (2 * i);
     }
     let mut block = [0; 8];

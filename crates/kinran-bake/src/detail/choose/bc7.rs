@@ -4,8 +4,9 @@
 use std::sync::LazyLock;
 
 use kinran_image::{Format, decode};
+use pulp::Simd;
 
-use super::{Blending, BlockGoal, Stored, TEXELS, least_squares, sum};
+use super::{BlockGoal, Line, Nearest, TEXELS, dot, least_squares};
 
 /// Rounds of fitting ends to the texels that chose them.
 const ROUNDS: usize = 2;
@@ -270,33 +271,25 @@ impl Block {
 
 /// Squared differences of a subset's texels and what they choose, given its ends.
 #[inline(always)]
-fn assign(
+fn assign<S: Simd>(
+    simd: S,
     mode: &Mode,
     ends: &[[i32; 3]; 2],
     low: [i32; 2],
     goal: &BlockGoal,
-    stored: Stored,
-    blend: Blending,
-) -> ([f32; TEXELS], [i32; TEXELS]) {
+    lines: &[Line; 256],
+) -> Nearest {
     let bytes: [[i32; 3]; 2] =
         std::array::from_fn(|end| std::array::from_fn(|c| Block::byte(mode, ends[end][c], low[end])));
-    let (mut least, mut choices) = ([f32::INFINITY; TEXELS], [0_i32; TEXELS]);
-    for (choice, &share) in shares(mode.index_bits).iter().enumerate() {
-        let mut errors = [0.0; TEXELS];
+    let mut colors = [[Line::default(); 3]; 16];
+    let shares = shares(mode.index_bits);
+    for (color, &share) in colors.iter_mut().zip(shares) {
         for c in 0..3 {
             let byte = ((64 - share) * bytes[0][c] + share * bytes[1][c] + 32) >> 6;
-            let of_channel = goal.errors(c, &[stored.value(byte as u8); TEXELS], blend);
-            for i in 0..TEXELS {
-                errors[i] += of_channel[i];
-            }
-        }
-        for i in 0..TEXELS {
-            let better = errors[i] < least[i];
-            choices[i] = if better { choice as i32 } else { choices[i] };
-            least[i] = if better { errors[i] } else { least[i] };
+            color[c] = lines[byte as usize & 255];
         }
     }
-    (least, choices)
+    goal.nearest(simd, &colors[..shares.len()])
 }
 
 /// Lowest bits that a pair of ends may have.
@@ -312,10 +305,10 @@ fn low_bits(mode: &Mode) -> &'static [[i32; 2]] {
 
 /// Replaces a block by one whose blended result is nearer to the target, if there is one.
 #[inline(always)]
-pub(super) fn choose(block: &mut [u8], goal: &BlockGoal, stored: Stored, blend: Blending) {
+pub(super) fn choose<S: Simd>(simd: S, block: &mut [u8], goal: &BlockGoal, lines: &[Line; 256]) {
     let mut bytes = [0; 16];
     bytes.copy_from_slice(block);
-    let (mut best, mut least) = (None, error_of(&decoded(&bytes), goal, stored, blend));
+    let (mut best, mut least) = (None, error_of(&decoded(&bytes), goal, lines));
     let mut line = Block {
         mode: ONE_LINE,
         partition: 0,
@@ -323,9 +316,9 @@ pub(super) fn choose(block: &mut [u8], goal: &BlockGoal, stored: Stored, blend: 
         low: [[1; 2]; 3],
         choices: [0; TEXELS],
     };
-    line.ends[0] = goal.line().map(|end| end.map(|v| Block::quantize(&ONE_LINE, v, 1)));
+    line.ends[0] = goal.line(simd).map(|end| end.map(|v| Block::quantize(&ONE_LINE, v, 1)));
     for start in [Block::read(block), Some(line)].into_iter().flatten() {
-        let (refined, error) = refine(start, goal, stored, blend);
+        let (refined, error) = refine(simd, start, goal, lines);
         if error < least {
             (best, least) = (Some(refined), error);
         }
@@ -337,34 +330,25 @@ pub(super) fn choose(block: &mut [u8], goal: &BlockGoal, stored: Stored, blend: 
 
 /// Choices by what they are blended to, then ends by least squares, subset by subset.
 #[inline(always)]
-fn refine(mut block: Block, goal: &BlockGoal, stored: Stored, blend: Blending) -> (Block, f32) {
+fn refine<S: Simd>(simd: S, mut block: Block, goal: &BlockGoal, lines: &[Line; 256]) -> (Block, f32) {
     let mode = block.mode;
     let subset_of = block.subset_of();
     let mut total = 0.0;
     for subset in 0..mode.subsets {
-        let inside: [f32; TEXELS] =
-            std::array::from_fn(|i| if usize::from(subset_of[i]) == subset { 1.0 } else { 0.0 });
-        let of_subset = |errors: &[f32; TEXELS]| {
-            let mut masked = [0.0; TEXELS];
-            for i in 0..TEXELS {
-                masked[i] = errors[i] * inside[i];
-            }
-            sum(&masked)
-        };
-        let (errors, mut choices) =
-            assign(&mode, &block.ends[subset], block.low[subset], goal, stored, blend);
-        let mut least = of_subset(&errors);
+        let inside = subset_of.map(|of| if usize::from(of) == subset { 1.0 } else { 0.0 });
+        let mut chosen = assign(simd, &mode, &block.ends[subset], block.low[subset], goal, lines);
+        let mut least = dot(simd, &chosen.errors, &inside);
         for _ in 0..ROUNDS {
-            let ideal = fit(&mode, &choices, &inside, goal);
+            let ideal = fit(simd, &mode, &chosen.choices, &inside, goal);
             let mut better = false;
             for &low in low_bits(&mode) {
                 let ends: [[i32; 3]; 2] = std::array::from_fn(|end| {
                     std::array::from_fn(|c| Block::quantize(&mode, ideal[end][c], low[end]))
                 });
-                let (errors, fitted) = assign(&mode, &ends, low, goal, stored, blend);
-                let error = of_subset(&errors);
+                let fitted = assign(simd, &mode, &ends, low, goal, lines);
+                let error = dot(simd, &fitted.errors, &inside);
                 if error < least {
-                    (block.ends[subset], block.low[subset], choices, least, better) =
+                    (block.ends[subset], block.low[subset], chosen, least, better) =
                         (ends, low, fitted, error, true);
                 }
             }
@@ -374,7 +358,7 @@ fn refine(mut block: Block, goal: &BlockGoal, stored: Stored, blend: Blending) -
         }
         for i in 0..TEXELS {
             if inside[i] > 0.0 {
-                block.choices[i] = choices[i] as u8;
+                block.choices[i] = chosen.choices[i] as u8;
             }
         }
         total += least;
@@ -384,7 +368,13 @@ fn refine(mut block: Block, goal: &BlockGoal, stored: Stored, blend: Blending) -
 
 /// The ends nearest to the exact solution, given what each texel of a subset takes of them.
 #[inline(always)]
-fn fit(mode: &Mode, choices: &[i32; TEXELS], inside: &[f32; TEXELS], goal: &BlockGoal) -> [[f32; 3]; 2] {
+fn fit<S: Simd>(
+    simd: S,
+    mode: &Mode,
+    choices: &[u32; TEXELS],
+    inside: &[f32; TEXELS],
+    goal: &BlockGoal,
+) -> [[f32; 3]; 2] {
     let of_index = shares(mode.index_bits);
     let first = choices.map(|choice| (64 - of_index[choice as usize]) as f32 * (1.0 / 64.0));
     let mut ends = [[0.0; 3]; 2];
@@ -393,7 +383,7 @@ fn fit(mode: &Mode, choices: &[i32; TEXELS], inside: &[f32; TEXELS], goal: &Bloc
         for i in 0..TEXELS {
             weight[i] = goal.weight[c][i] * inside[i];
         }
-        let (a, b) = least_squares(&first, &goal.v[c], &weight);
+        let (a, b) = least_squares(simd, &first, &goal.v[c], &weight);
         (ends[0][c], ends[1][c]) = (a, b);
     }
     ends
@@ -401,16 +391,17 @@ fn fit(mode: &Mode, choices: &[i32; TEXELS], inside: &[f32; TEXELS], goal: &Bloc
 
 /// The blended error of a block as it is.
 #[inline(always)]
-fn error_of(texels: &[[f32; 4]; TEXELS], goal: &BlockGoal, stored: Stored, blend: Blending) -> f32 {
-    let mut errors = [0.0; TEXELS];
+fn error_of(texels: &[[f32; 4]; TEXELS], goal: &BlockGoal, lines: &[Line; 256]) -> f32 {
+    let mut total = 0.0;
     for c in 0..3 {
-        let s = texels.map(|texel| stored.value((texel[c] * 255.0 + 0.5) as u8));
-        let of_channel = goal.errors(c, &s, blend);
         for i in 0..TEXELS {
-            errors[i] += of_channel[i];
+            let line = &lines[(texels[i][c] * 255.0 + 0.5) as usize & 255];
+            let [slope, offset] = if goal.d[c][i] < 0.5 { line.dark } else { line.bright };
+            let difference = (slope * goal.d[c][i] + (offset - goal.t[c][i])) * goal.gain[c][i];
+            total += difference * difference;
         }
     }
-    sum(&errors)
+    total
 }
 
 #[cfg(test)]
