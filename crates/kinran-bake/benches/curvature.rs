@@ -13,6 +13,7 @@ use std::time::Instant;
 
 use kinran_bake::curvature::{Mesh, Method, Options, bake_curvature, principal};
 use kinran_bake::skin_lut::{Profile, ambient_table, punctual_table};
+use kinran_shading::skin::profile::RadialProfile;
 use shapes::torus;
 
 /// Millimetres of the larger radius.
@@ -79,9 +80,13 @@ fn main() {
     }
 
     println!("\ntables, 512 x 512 RGB, one thread, ms");
-    for (name, profile) in
-        [("six Gaussians", Profile::default()), ("Burley", Profile::Burley([0.9, 0.4, 0.2]))]
-    {
+    let skin = RadialProfile::skin();
+    let rows = (0..400).map(|i| 19.0 * f64::from(i) / 399.0).map(|r| (r, skin.density(r))).collect();
+    for (name, profile) in [
+        ("six Gaussians", Profile::default()),
+        ("Burley", Profile::Burley([0.9, 0.4, 0.2])),
+        ("400 rows", Profile::Table(rows)),
+    ] {
         let radial = profile.radial().expect("a profile");
         let mut fastest = f64::INFINITY;
         for _ in 0..5 {

@@ -1,7 +1,8 @@
 //! Tables of pre-integrated skin: punctual light, ambient light, shadows' penumbras.
 
 use kinran_image::{Error, Format, Level, Texture, Transfer, encode_half};
-use kinran_shading::skin::profile::{Gaussian, ProfileError, RadialProfile};
+use kinran_shading::skin::profile::{Gaussian, LinearProfile, ProfileError, RadialProfile};
+use kinran_shading::skin::sampled::Sample;
 use rayon::prelude::*;
 
 use crate::srgb_from_linear;
@@ -46,8 +47,12 @@ impl Profile {
     }
 }
 
-/// Samples of a tabulated profile along a line.
-const SAMPLES: usize = 4096;
+/// A profile along a line whose densities are quick to ask for.
+fn sampled<'a>(profile: RadialProfile<'a>, samples: &'a mut Vec<Sample>) -> LinearProfile<'a> {
+    let linear = profile.to_linear();
+    samples.resize(linear.rows() + 4096, Sample::default());
+    linear.sampled(samples)
+}
 
 /// A table of RGB, row by row.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,8 +71,8 @@ pub fn punctual_table(profile: RadialProfile<'_>, width: usize, height: usize, r
     if let Some(lengths) = profile.burley_lengths() {
         return burley_table(lengths, width, height, range);
     }
-    let mut samples = vec![[0.0; 3]; SAMPLES];
-    let linear = profile.to_linear().sampled(&mut samples);
+    let mut samples = Vec::new();
+    let linear = sampled(profile, &mut samples);
     let mut entries = vec![[0.0f32; 3]; width * height];
     entries.par_chunks_mut(width).enumerate().for_each(|(row, entries)| {
         let mut exact = vec![[0.0; 3]; width];
@@ -144,8 +149,8 @@ pub fn ambient_table(profile: RadialProfile<'_>, width: usize, range: f64) -> Ta
 /// to end at 1, which its outermost texels hold: what leaks out of a penumbra that is too narrow for it would else light all
 /// of the shadow behind.
 pub fn penumbra_table(profile: RadialProfile<'_>, width: usize, height: usize, range: f64) -> Table {
-    let mut samples = vec![[0.0; 3]; SAMPLES];
-    let linear = profile.to_linear().sampled(&mut samples);
+    let mut samples = Vec::new();
+    let linear = sampled(profile, &mut samples);
     let mut entries = vec![[0.0f32; 3]; width * height];
     entries.par_chunks_mut(width).enumerate().for_each(|(row, entries)| {
         let penumbra = height as f64 / ((row as f64 + 0.5) * range);
@@ -238,8 +243,8 @@ impl Table {
 
 /// The largest error of reading a punctual table between its texels, on a grid four times as fine.
 pub fn punctual_interpolation_error(profile: RadialProfile<'_>, table: &Table, range: f64) -> f32 {
-    let mut samples = vec![[0.0; 3]; SAMPLES];
-    let linear = profile.to_linear().sampled(&mut samples);
+    let mut samples = Vec::new();
+    let linear = sampled(profile, &mut samples);
     let (columns, rows) = (4 * table.width, 4 * table.height);
     (0..rows)
         .into_par_iter()

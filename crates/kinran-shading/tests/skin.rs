@@ -11,6 +11,7 @@ use kinran_shading::skin::curvature::{
 use kinran_shading::skin::lighting::{skin_irradiance, skin_lut_uv, skin_normal, skin_specular};
 use kinran_shading::skin::profile::{Gaussian, ProfileError, RadialProfile, SKIN};
 use kinran_shading::skin::ring::column_n_u;
+use kinran_shading::skin::sampled::Sample;
 use kinran_shading::{Sym2, ggx_d, smith_v};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -206,7 +207,7 @@ fn quadrature_of_any_profile_meets_the_closed_form_of_gaussians() {
         })
         .collect();
     let table = RadialProfile::table(&rows).unwrap();
-    let mut samples = vec![[0.0; 3]; 4096];
+    let mut samples = vec![Sample::default(); rows.len() + 4096];
     let sampled = table.to_linear().sampled(&mut samples);
     for curvature in [0.05, 0.4] {
         let (mut exact, mut got) = (vec![[0.0; 3]; 33], vec![[0.0; 3]; 33]);
@@ -225,6 +226,63 @@ fn quadrature_of_any_profile_meets_the_closed_form_of_gaussians() {
         for c in [0, 1, 2] {
             assert!((want.h_one[c] - got.h_one[c]).abs() < 1e-5, "h1: {want:?} {got:?}");
             assert!((want.h_two[c] - got.h_two[c]).abs() < 1e-5, "h2: {want:?} {got:?}");
+        }
+    }
+}
+
+/// The ring at every column by the midpoint rule between a table's rows, whose nodes crowd at both ends.
+fn brute_force_ring(rows: &[(f64, [f64; 3])], curvature: f64, columns: usize) -> Vec<[f64; 3]> {
+    let linear = RadialProfile::table(rows).unwrap().to_linear();
+    let angle = |chord: f64| 2.0 * (0.5 * chord * curvature).min(1.0).asin();
+    let mut knots: Vec<f64> = [0.0].into_iter().chain(rows.iter().map(|row| angle(row.0))).collect();
+    knots.dedup();
+    let nodes = 24.max(8000 / knots.len());
+    let (mut ring, mut one) = (vec![[0.0; 3]; columns], [0.0; 3]);
+    for ends in knots.windows(2) {
+        for node in 0..nodes {
+            let t = (node as f64 + 0.5) / nodes as f64;
+            let angle = ends[0] + (ends[1] - ends[0]) * t * t * (3.0 - 2.0 * t);
+            let weight = (ends[1] - ends[0]) * 6.0 * t * (1.0 - t);
+            let mass = linear.density(2.0 / curvature * (0.5 * angle).sin()).map(|x| x * weight);
+            (0..3).for_each(|c| one[c] += 2.0 * mass[c]);
+            for (i, d) in ring.iter_mut().enumerate() {
+                let light = column_n_u(i, columns).acos();
+                let seen = (light - angle).cos().max(0.0) + (light + angle).cos().max(0.0);
+                (0..3).for_each(|c| d[c] += mass[c] * seen);
+            }
+        }
+    }
+    ring.iter().map(|d| std::array::from_fn(|c| d[c] / one[c])).collect()
+}
+
+/// Rings that the profile goes round or hardly leaves its place on; at 0.25 and 1 a root lies on the far side of the ring.
+#[test]
+fn a_sampled_table_s_ring_keeps_steps_corners_and_spikes() {
+    let cone = vec![(0.0, [1.0, 0.5, 2.0]), (3.0, [0.0; 3])];
+    let disc =
+        vec![(0.0, [1.0; 3]), (2.0, [1.0, 0.3, 1.0]), (2.001, [0.0, 0.3, 0.0]), (8.0, [0.0, 0.3, 1e-4])];
+    let spike = vec![(0.0, [100.0, 1.0, 0.0]), (0.05, [1.0, 0.01, 1.0]), (6.0, [0.0, 0.02, 0.0])];
+    let skin = RadialProfile::skin();
+    let fine = (0..400).map(|i| 19.0 * f64::from(i) / 399.0).map(|r| (r, skin.density(r))).collect();
+    for (name, rows) in [("cone", cone), ("disc", disc), ("spike", spike), ("skin", fine)] {
+        let linear = RadialProfile::table(&rows).unwrap().to_linear();
+        let mut samples = vec![Sample::default(); rows.len() + 4096];
+        let sampled = linear.sampled(&mut samples);
+        for (curvature, columns) in
+            [(1e-3, 32), (0.02, 33), (0.1, 7), (0.25, 32), (0.5, 64), (0.67, 33), (1.0, 64), (4.0, 33)]
+        {
+            let exact = brute_force_ring(&rows, curvature, columns);
+            let mut got = vec![[0.0; 3]; columns];
+            sampled.ring_row(curvature, &mut got);
+            for i in 0..columns {
+                for c in [0, 1, 2] {
+                    let (want, got) = (exact[i][c], got[i][c]);
+                    assert!(
+                        (want - got).abs() < 3e-6,
+                        "{name}, curvature {curvature}, column {i} of {columns}, channel {c}: wanted {want}, got {got}"
+                    );
+                }
+            }
         }
     }
 }

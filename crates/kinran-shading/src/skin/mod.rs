@@ -15,4 +15,5 @@ pub mod lighting;
 pub mod penumbra;
 pub mod profile;
 pub mod ring;
+pub mod sampled;
 pub mod sphere;

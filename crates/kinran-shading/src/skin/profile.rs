@@ -10,6 +10,7 @@
 //! red, green and blue spread.
 
 use super::bessel::k0;
+use super::sampled::{self, Sample};
 use core::f64::consts::PI;
 use libm::{exp, log, pow, sqrt};
 
@@ -66,11 +67,8 @@ pub(crate) enum Shape<'a> {
     Gaussians(&'a [Gaussian]),
     Burley([f64; 3]),
     Table(&'a [(f64, [f64; 3])]),
-    /// Of a linear profile alone: densities at distances `reach (i / last)²`.
-    Sampled {
-        values: &'a [[f64; 3]],
-        reach: f64,
-    },
+    /// Of a linear profile alone.
+    Sampled(&'a [Sample]),
 }
 
 /// A profile per square millimetre against the distance from the point where light enters.
@@ -204,8 +202,8 @@ impl<'a> RadialProfile<'a> {
                     (_, None) => [0.0; 3],
                 }
             }
-            // `sample` makes linear profiles only.
-            Shape::Sampled { .. } => [0.0; 3],
+            // `sampled` makes linear profiles only.
+            Shape::Sampled(_) => [0.0; 3],
         }
     }
 }
@@ -253,30 +251,8 @@ impl<'a> LinearProfile<'a> {
                 }
                 sum
             }
-            Shape::Sampled { values, reach } => {
-                let last = values.len() - 1;
-                if x >= reach {
-                    return values[last].map(|v| if x > reach { 0.0 } else { v });
-                }
-                // Straight in the distance, not in its root.
-                let squared = x / reach * (last * last) as f64;
-                let i = (sqrt(squared) as usize).min(last - 1);
-                let t = (squared - (i * i) as f64) / (2 * i + 1) as f64;
-                each(|c| values[i][c] + t * (values[i + 1][c] - values[i][c]))
-            }
+            Shape::Sampled(samples) => sampled::density(samples, x),
         }
-    }
-
-    /// A copy whose density is read from `samples`, which this fills: a table's takes time in proportion to its rows, and
-    /// a ring asks thousands of times. With 4096 samples rings are the same to 2e-6. Other profiles, whose
-    /// densities are closed, come back as they are.
-    pub fn sampled(self, samples: &'a mut [[f64; 3]]) -> LinearProfile<'a> {
-        let Shape::Table(rows) = self.0 else { return self };
-        let (reach, last) = (rows[rows.len() - 1].0, samples.len() - 1);
-        for (i, sample) in samples.iter_mut().enumerate() {
-            *sample = self.density(reach * (i * i) as f64 / (last * last) as f64);
-        }
-        LinearProfile(Shape::Sampled { values: samples, reach })
     }
 
     /// The shortest length over which the density changes much, millimetres.
@@ -285,7 +261,7 @@ impl<'a> LinearProfile<'a> {
             Shape::Gaussians(sum) => sum.iter().map(|g| sqrt(g.variance)).fold(f64::INFINITY, f64::min),
             Shape::Burley(d) => d.into_iter().fold(f64::INFINITY, f64::min),
             // Rows may stand as close as they like near zero, where pieces are short anyway.
-            Shape::Table(_) | Shape::Sampled { .. } => self.reach() / 200.0,
+            Shape::Table(_) | Shape::Sampled(_) => self.reach() / 200.0,
         }
     }
 
@@ -295,7 +271,7 @@ impl<'a> LinearProfile<'a> {
             Shape::Gaussians(sum) => 6.5 * sum.iter().map(|g| sqrt(g.variance)).fold(0.0, f64::max),
             Shape::Burley(d) => 63.0 * d.into_iter().fold(0.0, f64::max),
             Shape::Table(rows) => rows[rows.len() - 1].0,
-            Shape::Sampled { reach, .. } => reach,
+            Shape::Sampled(samples) => samples[samples.len() - 1].distance,
         }
     }
 }

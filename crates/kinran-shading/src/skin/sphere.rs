@@ -57,29 +57,36 @@ impl RadialProfile<'_> {
                     (factors.h_one[c], factors.h_two[c]) = (h_one, h_two);
                 }
             }
-            Shape::Sampled { .. } => {}
+            Shape::Sampled(_) => {}
             Shape::Table(rows) => {
-                for c in [0, 1, 2] {
-                    let mut moments = [0.0; 3];
-                    let mut add = |c0: f64, c1: f64, a: f64, b: f64| {
-                        let c1 = c1.min(2.0 * r);
-                        if c0 < c1 {
-                            for (n, moment) in [0, 2, 4].into_iter().zip(&mut moments) {
-                                // ∫ (a + b c) c^(n+1) dc.
-                                let power = |k: i32| {
-                                    (libm::pow(c1, f64::from(k)) - libm::pow(c0, f64::from(k))) / f64::from(k)
-                                };
-                                *moment += a * power(n + 2) + b * power(n + 3);
-                            }
-                        }
-                    };
-                    add(0.0, rows[0].0, rows[0].1[c], 0.0);
-                    for pair in rows.windows(2) {
-                        let slope = (pair[1].1[c] - pair[0].1[c]) / (pair[1].0 - pair[0].0);
-                        add(pair[0].0, pair[1].0, pair[0].1[c] - slope * pair[0].0, slope);
+                // c^k / k for k from 2 to 7: antiderivatives of (a + b c) c^(n+1) for n = 0, 2, 4.
+                let powers = |c: f64| {
+                    let mut power = c;
+                    core::array::from_fn::<_, 6, _>(|i| {
+                        power *= c;
+                        power / (i + 2) as f64
+                    })
+                };
+                let mut moments = [[0.0; 3]; 3];
+                let (mut before, mut below) = ((0.0, rows[0].1), [0.0; 6]);
+                for &row in rows.iter().filter(|row| row.0 > 0.0) {
+                    if before.0 >= 2.0 * r {
+                        break;
                     }
-                    let (h_one, h_two) = from_moments(r, moments[0], moments[1], moments[2]);
-                    (factors.h_one[c], factors.h_two[c]) = (h_one, h_two);
+                    let above = powers(row.0.min(2.0 * r));
+                    for (c, moments) in moments.iter_mut().enumerate() {
+                        let slope = (row.1[c] - before.1[c]) / (row.0 - before.0);
+                        let constant = before.1[c] - slope * before.0;
+                        for (n, moment) in moments.iter_mut().enumerate() {
+                            *moment += constant * (above[2 * n] - below[2 * n])
+                                + slope * (above[2 * n + 1] - below[2 * n + 1]);
+                        }
+                    }
+                    (before, below) = (row, above);
+                }
+                for c in [0, 1, 2] {
+                    let [zero, second, fourth] = moments[c];
+                    (factors.h_one[c], factors.h_two[c]) = from_moments(r, zero, second, fourth);
                 }
             }
         }
