@@ -363,7 +363,10 @@ fn sample_materials_are_solved_better_than_by_the_talk() {
     ]);
     let means = report["means"].as_array().unwrap();
     let kinds: Vec<&str> = means.iter().map(|mean| mean["map"].as_str().unwrap()).collect();
-    assert!(kinds.contains(&"color") && kinds.contains(&"normal"), "{kinds:?}");
+    // The aniso maps are made of normals and roughness.
+    for kind in ["color", "normal", "roughness", "aniso"] {
+        assert!(kinds.contains(&kind), "no {kind} in {kinds:?}");
+    }
     for mean in means {
         let [blended, talk, target] = ["blended", "talk", "target"].map(|key| mean[key].as_f64().unwrap());
         println!(

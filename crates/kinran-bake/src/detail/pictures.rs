@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use kinran_image::{Channels, Error, Image, Pixels, Transfer, encode_parallel};
+use kinran_shading::detail::detail_from_texel;
 use kinran_shading::normal_from_xy;
 
 use super::code::code_from_linear;
@@ -10,15 +11,15 @@ use super::map::{MapKind, Planes, bytes_of_planes, decoded_level, synthesized_le
 use super::solve::{DetailOptions, Solved, Target, blend};
 use crate::mips::unorm8;
 
-/// Factor on differences in pictures of errors.
-pub const ERROR_GAIN: f32 = 8.0;
+/// Factor on differences in pictures of errors, chosen by eye: a step of 8 bits shows, and eight are as bright as can be.
+pub const ERROR_GAIN: f32 = 32.0;
 
 /// Pictures of one level: RGB, 8 bits, colour in sRGB.
 #[derive(Clone, Debug)]
 pub struct LevelPictures {
     /// The detail alone, as the GPU decodes it.
     pub detail: Image,
-    /// `s`, as stored.
+    /// `s`, as stored; for normals with the z that is not.
     pub synthesized: Image,
     /// Both together.
     pub blended: Image,
@@ -67,10 +68,18 @@ pub fn level_pictures(
             };
             let [blended, wanted, alone] =
                 [blended, vector(wanted), vector(&alone)].map(|v| shown(v, target.kind));
+            let synthesized = match target.kind {
+                MapKind::Normal => {
+                    let s = detail_from_texel(texel) * 2.0 - 1.0;
+                    shown(normal_from_xy(s.x, s.y), target.kind)
+                }
+                _ if srgb => shown(texel, MapKind::Color),
+                _ => texel,
+            };
             let error = |v: Vec3| ((v - wanted) * ERROR_GAIN).abs().min(Vec3::ONE);
             let all = [
                 shown(detail, target.kind),
-                if srgb { shown(texel, MapKind::Color) } else { texel },
+                synthesized,
                 blended,
                 wanted,
                 alone,

@@ -135,7 +135,7 @@ pub struct DetailOptions {
     /// How `s` of colour is stored: sRGB is finer where `s` is below 0.22, linear above. `None` tries both three levels
     /// below the finest and keeps the better; all other kinds are linear.
     pub transfer: Option<Transfer>,
-    /// Measures every texel; off, up to 16 bands of 16 rows a level, evenly spread.
+    /// Measures every texel; off, up to 8 bands of 16 rows a level, evenly spread.
     pub measure_all: bool,
     /// Levels of the target left out of `s`: its finest is this one.
     pub first_level: usize,
@@ -258,7 +258,7 @@ pub struct Solved {
 const BAND: usize = 16;
 
 /// Bands per level whose errors are measured, unless all are.
-const MEASURED_BANDS: usize = 16;
+const MEASURED_BANDS: usize = 8;
 
 /// Solves a target against its layers, all levels from `options.first_level` down, in parallel; `progress` is told how
 /// many texels were finished since it was last called. The bytes do not depend on the number of threads.

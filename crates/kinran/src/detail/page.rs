@@ -1,5 +1,7 @@
 //! The library's report as a page.
 
+use kinran_bake::detail::ERROR_GAIN;
+
 use super::library::{LibraryMean, LibraryReport, LibraryRow};
 
 /// Pictures of a target, in order.
@@ -20,6 +22,7 @@ h1 { font-weight: normal; } h2 { font-weight: normal; color: var(--gold); margin
 p { max-width: 48rem; color: var(--faint); }
 table { border-collapse: collapse; font: 14px/1.5 ui-monospace, 'DejaVu Sans Mono', monospace; }
 th, td { text-align: right; padding: .25rem .8rem; border-bottom: 1px solid var(--line); font-weight: normal; }
+td { white-space: nowrap; }
 th { color: var(--faint); } .good { color: #7ed38a; } .bad { color: #e08a7a; }
 .maps { display: grid; grid-template-columns: repeat(6, 1fr); gap: .6rem; margin: .6rem 0; }
 figure { margin: 0; } figcaption { color: var(--faint); font-size: .8rem; } img { width: 100%; display: block; }
@@ -105,7 +108,7 @@ pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
 bits, for normals in degrees, of the second mip and of the first. \"own\": against the tiles the target was painted over;
 \"other\": against the nearest tile of another material; \"faded\": against that at the largest opacity with which the result is
 no worse than the compressed target. \"Magnified\": the first mip at twice its size, against the exact solution over the tiles
-as authored. Error pictures are 8 times enlarged.</p>
+as authored. Error pictures are {ERROR_GAIN} times enlarged.</p>
 <table>
 <tr>{head}
 {means}</table>
