@@ -33,6 +33,17 @@ pub enum FuzzAttenuation {
     None,
 }
 
+/// How a direction texture holds fibres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FuzzDirection {
+    /// A tangent-space vector, encoded as a normal map is, +Y up.
+    #[default]
+    Vector,
+    /// Tilt from the normal over π/2 in R, azimuth from the tangent over 2π in G. Renderers turn them into vectors before
+    /// anything is averaged.
+    Angles,
+}
+
 /// A layer of fibres over the base.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FuzzLayer {
@@ -52,9 +63,10 @@ pub struct FuzzLayer {
     pub tilt: f32,
     /// Radians, counter-clockwise from the tangent.
     pub azimuth: f32,
-    /// The fibres' direction as a tangent-space vector, encoded as a normal map is, +Y up. It takes the place of tilt
-    /// and azimuth.
+    /// The fibres' direction; it takes the place of tilt and azimuth. Linear.
     pub direction_texture: Option<TextureRef>,
+    /// How the texture holds it.
+    pub direction_encoding: FuzzDirection,
     /// 0 shades the layer with the base's normal, 1 with the mesh's.
     pub normal_smoothness: f32,
     /// What is left of the base.
@@ -74,6 +86,7 @@ impl Default for FuzzLayer {
             tilt: 0.0,
             azimuth: 0.0,
             direction_texture: None,
+            direction_encoding: FuzzDirection::Vector,
             normal_smoothness: 0.0,
             attenuation: FuzzAttenuation::Full,
         }
@@ -176,6 +189,11 @@ impl Fuzz {
                 set("fiberColorFactor", color(layer.color), color(default.color));
                 set("tilt", number(layer.tilt), number(default.tilt));
                 set("azimuth", number(layer.azimuth), number(default.azimuth));
+                set(
+                    "directionEncoding",
+                    json!(layer.direction_encoding.name()),
+                    json!(default.direction_encoding.name()),
+                );
                 set("normalSmoothness", number(layer.normal_smoothness), number(default.normal_smoothness));
                 set("attenuation", json!(layer.attenuation.name()), json!(default.attenuation.name()));
             }
@@ -224,6 +242,17 @@ impl FuzzPhase {
     /// Its name in files.
     pub fn name(self) -> &'static str {
         Self::NAMES.iter().find(|(_, phase)| *phase == self).map_or("", |(name, _)| name)
+    }
+}
+
+impl FuzzDirection {
+    /// All, under the names that files have.
+    pub const NAMES: [(&'static str, FuzzDirection); 2] =
+        [("vector", FuzzDirection::Vector), ("angles", FuzzDirection::Angles)];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, encoding)| *encoding == self).map_or("", |(name, _)| name)
     }
 }
 

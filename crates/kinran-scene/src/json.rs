@@ -354,6 +354,7 @@ pub(crate) struct Fuzz {
     pub(crate) tilt: Option<f32>,
     pub(crate) azimuth: Option<f32>,
     pub(crate) direction_texture: Option<TextureInfo>,
+    pub(crate) direction_encoding: Option<String>,
     pub(crate) normal_smoothness: Option<f32>,
     pub(crate) attenuation: Option<String>,
 }

@@ -25,7 +25,7 @@ pub use detail::{
 pub use document::{Attribute, Document, Object, Slot, TextureExtension};
 pub use environment::Environment;
 pub use error::Error;
-pub use fuzz::{FUZZ_EXTENSION, Fuzz, FuzzAttenuation, FuzzLayer, FuzzPhase, SHEEN_MATCH};
+pub use fuzz::{FUZZ_EXTENSION, Fuzz, FuzzAttenuation, FuzzDirection, FuzzLayer, FuzzPhase, SHEEN_MATCH};
 pub use scene::{
     AlphaMode, Anisotropy, Camera, DiffuseTransmission, Instance, Light, LightKind, Material, Primitive,
     Scene, Skin, SkinProfile, Source, TextureRef, VertexCurvature, Wrap,

@@ -16,8 +16,8 @@ use crate::container::{Resolver, beside, fetch, read_regular_file, split};
 use crate::obj::glb_from_obj;
 use crate::{
     AlphaMode, Anisotropy, Camera, DiffuseTransmission, Error, FUZZ_EXTENSION, Fuzz, FuzzAttenuation,
-    FuzzLayer, FuzzPhase, Instance, Light, LightKind, Material, Primitive, Scene, Skin, SkinProfile, Source,
-    TextureRef, VertexCurvature, Wrap, json, tangent,
+    FuzzDirection, FuzzLayer, FuzzPhase, Instance, Light, LightKind, Material, Primitive, Scene, Skin,
+    SkinProfile, Source, TextureRef, VertexCurvature, Wrap, json, tangent,
 };
 
 /// Extensions that may stand in `extensionsRequired`: those this module reads, and those that change how
@@ -418,6 +418,12 @@ impl Loader<'_> {
                 .min(right_angle),
             azimuth: self.finite([fuzz.azimuth.unwrap_or(default.azimuth)], &format!("{what}: azimuth"))?[0],
             direction_texture: self.texture(&fuzz.direction_texture, &format!("{what}: directionTexture"))?,
+            direction_encoding: self.named(
+                &fuzz.direction_encoding,
+                &FuzzDirection::NAMES,
+                &what,
+                "directionEncoding",
+            )?,
             normal_smoothness: {
                 let smoothness = fuzz.normal_smoothness.unwrap_or(default.normal_smoothness);
                 self.within(smoothness, 0.0..=1.0, &what, "normalSmoothness")?

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use glam::Vec3;
-use kinran_scene::{Document, Fuzz, FuzzAttenuation, FuzzLayer, FuzzPhase, SHEEN_MATCH, Scene};
+use kinran_scene::{
+    Document, Fuzz, FuzzAttenuation, FuzzDirection, FuzzLayer, FuzzPhase, SHEEN_MATCH, Scene,
+};
 use kinran_shading::fuzz::fuzz_brdf;
 use serde_json::{Value, json};
 
@@ -34,6 +36,7 @@ fn a_layer_is_read_with_its_defaults() {
     let read = fuzz(json!({ "KINRAN_materials_fuzz": {
         "phase": "velvet", "density": 0.5, "spread": 0.75, "fiberColorFactor": [1, 0.5, 0.25],
         "tilt": std::f64::consts::FRAC_PI_2, "azimuth": -1.5, "normalSmoothness": 0.25, "attenuation": "unscattered",
+        "directionEncoding": "angles",
     } }));
     let wanted = FuzzLayer {
         phase: FuzzPhase::Velvet,
@@ -44,6 +47,7 @@ fn a_layer_is_read_with_its_defaults() {
         azimuth: -1.5,
         normal_smoothness: 0.25,
         attenuation: FuzzAttenuation::Unscattered,
+        direction_encoding: FuzzDirection::Angles,
         ..FuzzLayer::default()
     };
     assert_eq!(read, Some(Fuzz::Layer(wanted)));
@@ -63,6 +67,7 @@ fn a_parameter_out_of_range_is_refused_by_material_field_and_range() {
         ("fuzziness", json!(-1), "0 to 1"),
         ("attenuation", json!("some"), "full, unscattered, albedo, none"),
         ("phase", json!("fibre"), "fiber, velvet"),
+        ("directionEncoding", json!("tilt"), "vector, angles"),
         ("densty", json!(0.2), "unknown field"),
     ] {
         let error = load(json!({ "KINRAN_materials_fuzz": { field: value } })).unwrap_err().to_string();
@@ -94,6 +99,7 @@ fn a_layer_survives_writing_and_leaves_a_sheen_for_others() {
         tilt: 0.4,
         azimuth: 1.25,
         attenuation: FuzzAttenuation::None,
+        direction_encoding: FuzzDirection::Angles,
         ..FuzzLayer::default()
     };
     for wanted in [Fuzz::Layer(layer), Fuzz::Simple { fuzziness: 0.75, texture: None }] {

@@ -14,7 +14,11 @@
 #define KINRAN_FUZZ_AMBIENT_GLSL
 
 /// Nodes of the ambient table along each of its sides, the first and the last at the ends of their ranges.
-const uint FUZZ_TABLE_SIZE = 64u;
+const uint FUZZ_TABLE_SIZE = 48u;
+
+/// Fibres of a smaller alpha are combed: six coefficients miss P_s by more than 0.09 and eight the ambient light by more
+/// than 14 %. `fibre_p_s` and the table take their places.
+const float FUZZ_COMBED_ALPHA = 0.3;
 
 /// Mean over the hemisphere of the layer's BRDF times cosine over phase (slide: Ambient Lighting, `G~`), for a view at
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
@@ -70,7 +74,7 @@ float fuzz_ambient_factor(float coefficients[8], float n_v, float t_v) {
 vec2 fuzz_ambient_place(float n_v, float t_v, float t_n) {
     float sines = sqrt(max(((1.0 - (n_v * n_v)) * (1.0 - (t_n * t_n))), 1e-12));
     float azimuth = clamp((0.5 + ((0.5 * (t_v - (n_v * t_n))) / sines)), 0.0, 1.0);
-    return (vec2(n_v, azimuth) * (1.0 - 0.015625)) + vec2((0.5 * 0.015625));
+    return (vec2(n_v, azimuth) * (1.0 - 0.020833334)) + vec2((0.5 * 0.020833334));
 }
 
 /// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a

@@ -384,8 +384,9 @@ struct FuzzView {
     float t_v;
     float escaped;
     float exponent;
-    float alpha_sqr;
-    float scale;
+    float squeeze;
+    float root;
+    float root_along;
 };
 
 /// What the layer makes of a light.
@@ -454,26 +455,28 @@ float fuzz_reciprocal_brdf(vec3 u, vec3 v, vec3 t, float density, float alpha) {
 
 /// Prepares `fuzz_light` for a view at cosine `n_v` > 0 to the normal and `t_v` to the fibres.
 ///
-/// Cost on GCN: 7 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 FuzzView fuzz_view(float n_v, float t_v, float density, float alpha) {
     float exponent = -1.442695 * density;
     float alpha_sqr = alpha * alpha;
-    return FuzzView(n_v, t_v, exp2((exponent / n_v)), exponent, alpha_sqr, ((alpha_sqr * alpha) * 0.07957747));
+    float k = 1.0 - alpha_sqr;
+    float root = 157.91367 * alpha_sqr;
+    return FuzzView(n_v, t_v, exp2((exponent / n_v)), exponent, ((0.5 * k) / alpha_sqr), root, (root * k));
 }
 
 /// Lobe and penetration for a light at cosines `n_u` > 0 to the normal, `t_u` to the fibres and `u_v` to the view:
-/// `fuzz_brdf` with one exponential for both. The cosines are the same in every frame.
+/// `fuzz_brdf` with one exponential for both and all that is known of the view drawn together. The cosines are the same
+/// in every frame.
 ///
-/// Cost on GCN: 22 instructions (4 at a quarter of the rate).
+/// Cost on GCN: 19 instructions (4 at a quarter of the rate).
 FuzzLight fuzz_light(FuzzView view, float n_u, float t_u, float u_v) {
     float penetrated = exp2((view.exponent / n_u));
-    float w = 2.000002 + (2.0 * u_v);
-    float s = t_u + view.t_v;
-    float k = 1.0 - view.alpha_sqr;
-    float m = ((s * s) * k) + (view.alpha_sqr * w);
     float scattered = 1.0 - (penetrated * view.escaped);
-    float lobe = ((((view.scale * scattered) * w) * w) * inversesqrt((1.0 - ((t_u * t_u) * k)))) / ((m * m) * (n_u + view.n_v));
-    return FuzzLight(lobe, penetrated);
+    float w = 1.000001 + u_v;
+    float s = t_u + view.t_v;
+    float m = ((s * s) * view.squeeze) + w;
+    float over_area = inversesqrt((view.root - ((t_u * t_u) * view.root_along)));
+    return FuzzLight(((((w * w) * scattered) * over_area) / ((m * m) * (n_u + view.n_v))), penetrated);
 }
 
 /// Factor on the base's BRDF (slide: Base Layer, `c_atten`): `(P_p + c_f (1 - P_p) P_s) P_e`, for the share `penetrated`
@@ -512,7 +515,11 @@ vec3 fuzz_smooth_normal(vec3 n, vec3 vertex_normal, float smoothness) {
 #define KINRAN_FUZZ_AMBIENT_GLSL
 
 /// Nodes of the ambient table along each of its sides, the first and the last at the ends of their ranges.
-const uint FUZZ_TABLE_SIZE = 64u;
+const uint FUZZ_TABLE_SIZE = 48u;
+
+/// Fibres of a smaller alpha are combed: six coefficients miss P_s by more than 0.09 and eight the ambient light by more
+/// than 14 %. `fibre_p_s` and the table take their places.
+const float FUZZ_COMBED_ALPHA = 0.3;
 
 /// Mean over the hemisphere of the layer's BRDF times cosine over phase (slide: Ambient Lighting, `G~`), for a view at
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
@@ -568,7 +575,7 @@ float fuzz_ambient_factor(float coefficients[8], float n_v, float t_v) {
 vec2 fuzz_ambient_place(float n_v, float t_v, float t_n) {
     float sines = sqrt(max(((1.0 - (n_v * n_v)) * (1.0 - (t_n * t_n))), 1e-12));
     float azimuth = clamp((0.5 + ((0.5 * (t_v - (n_v * t_n))) / sines)), 0.0, 1.0);
-    return (vec2(n_v, azimuth) * (1.0 - 0.015625)) + vec2((0.5 * 0.015625));
+    return (vec2(n_v, azimuth) * (1.0 - 0.020833334)) + vec2((0.5 * 0.020833334));
 }
 
 /// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a
@@ -617,7 +624,7 @@ vec3 fuzz_ambient_attenuation(float escaped, float q, float downward, vec3 fibre
 
 // Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
 // Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
-// Made from src/fuzz_deferred.wesl, by ./x shaders. Needs: fuzz_layer, fuzz_phase
+// Made from src/fuzz_deferred.wesl, by ./x shaders. Needs: fuzz_layer
 
 // Fuzz by seven bits of a G-buffer: fixed fibres over Lambert, for moss and felt.
 //
@@ -639,6 +646,9 @@ const float FUZZ_DEFERRED_ALBEDO = 5.0;
 /// How far light wraps around the terminator, as a cosine.
 const float FUZZ_WRAP = 0.2;
 
+/// `(1+n)/(2 (1+w)^(1+n))` for n = 2: with it the wrapped cosine integrates to π over the sphere.
+const float FUZZ_WRAP_SCALE = 0.86805546;
+
 /// The cosine of light and normal, softened by wrapping (McAuley 2013; slide: Deferred), n = 2:
 /// `(1+n)/(2(1+w)) (max(n_u + w, 0)/(1+w))^n`. Its integral over the sphere is π. Where no light arrives it is 1e-8
 /// rather than zero, so that the layer may divide by it.
@@ -646,7 +656,7 @@ const float FUZZ_WRAP = 0.2;
 /// Cost on GCN: 4 instructions.
 float fuzz_wrap(float n_u) {
     float c = max((n_u + FUZZ_WRAP), 0.0001);
-    return (0.86805546 * c) * c;
+    return (FUZZ_WRAP_SCALE * c) * c;
 }
 
 /// P_e of the deferred layer, once a pixel.
@@ -659,15 +669,21 @@ float fuzz_deferred_escape(float n_v) {
 
 /// BRDF times cosine of the deferred layer for a fibre albedo of one, from the cosines of light and view with the normal
 /// and with each other and `fuzz_deferred_escape`. Lights down to `n_u = -FUZZ_WRAP` reach it. The picture is
-/// `lerp(Lambert, this, fuzziness)`; the base is not shadowed.
+/// `lerp(Lambert, this, fuzziness)`; the base is not shadowed. It is `fibre_phase` and `fuzz_layer` times cosine with
+/// `fuzz_wrap` for the light's cosine, every constant factor drawn into another.
 ///
-/// Cost on GCN: 28 instructions (5 at a quarter of the rate).
+/// Cost on GCN: 23 instructions (4 at a quarter of the rate).
 float fuzz_deferred(float n_u, float n_v, float u_v, float escaped) {
-    float _e4 = fuzz_wrap(n_u);
-    float _e6 = fuzz_passage(FUZZ_DEFERRED_DENSITY, _e4);
-    float passed = _e6 * escaped;
-    float _e9 = fibre_phase(u_v, n_u, n_v, FUZZ_DEFERRED_ALPHA);
-    return ((_e9 * (1.0 - passed)) * _e4) / (_e4 + n_v);
+    float c = max((n_u + FUZZ_WRAP), 0.0001);
+    float wrapped = c * c;
+    float _e11 = fuzz_passage(0.57600003, wrapped);
+    float passed = _e11 * escaped;
+    float w = 1.000001 + u_v;
+    float s = n_u + n_v;
+    float m = ((s * s) * 0.055555534) + w;
+    float over_area = inversesqrt((142.1223 - ((n_u * n_u) * 14.212225)));
+    float above = (((w * w) * wrapped) * (1.0 - passed)) * over_area;
+    return above / ((m * m) * (wrapped + (n_v * 1.1520001)));
 }
 
 /// Albedo of the fibres over a Lambert base of albedo `base`: `5 base`, as the talk has it, but no more than the layer

@@ -46,7 +46,11 @@ struct Float3x9Array {
 #endif
 
 /// Nodes of the ambient table along each of its sides, the first and the last at the ends of their ranges.
-constant uint FUZZ_TABLE_SIZE = 64u;
+constant uint FUZZ_TABLE_SIZE = 48u;
+
+/// Fibres of a smaller alpha are combed: six coefficients miss P_s by more than 0.09 and eight the ambient light by more
+/// than 14 %. `fibre_p_s` and the table take their places.
+constant float FUZZ_COMBED_ALPHA = 0.3;
 
 /// Mean over the hemisphere of the layer's BRDF times cosine over phase (slide: Ambient Lighting, `G~`), for a view at
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
@@ -122,7 +126,7 @@ inline metal::float2 fuzz_ambient_place(
 ) {
     float sines = metal::sqrt(metal::max((1.0 - (n_v * n_v)) * (1.0 - (t_n * t_n)), 0.000000000001));
     float azimuth = metal::saturate(0.5 + ((0.5 * (t_v - (n_v * t_n))) / sines));
-    return (metal::float2(n_v, azimuth) * (1.0 - 0.015625)) + metal::float2(0.5 * 0.015625);
+    return (metal::float2(n_v, azimuth) * (1.0 - 0.020833334)) + metal::float2(0.5 * 0.020833334);
 }
 
 /// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a

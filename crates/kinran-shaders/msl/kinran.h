@@ -488,8 +488,9 @@ struct FuzzView {
     float t_v;
     float escaped;
     float exponent;
-    float alpha_sqr;
-    float scale;
+    float squeeze;
+    float root;
+    float root_along;
 };
 
 /// What the layer makes of a light.
@@ -584,7 +585,7 @@ inline float fuzz_reciprocal_brdf(
 
 /// Prepares `fuzz_light` for a view at cosine `n_v` > 0 to the normal and `t_v` to the fibres.
 ///
-/// Cost on GCN: 7 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 inline FuzzView fuzz_view(
     float n_v,
     float t_v,
@@ -593,13 +594,16 @@ inline FuzzView fuzz_view(
 ) {
     float exponent = -1.442695 * density;
     float alpha_sqr = alpha * alpha;
-    return FuzzView {n_v, t_v, metal::exp2(exponent / n_v), exponent, alpha_sqr, (alpha_sqr * alpha) * 0.07957747};
+    float k = 1.0 - alpha_sqr;
+    float root = 157.91367 * alpha_sqr;
+    return FuzzView {n_v, t_v, metal::exp2(exponent / n_v), exponent, (0.5 * k) / alpha_sqr, root, root * k};
 }
 
 /// Lobe and penetration for a light at cosines `n_u` > 0 to the normal, `t_u` to the fibres and `u_v` to the view:
-/// `fuzz_brdf` with one exponential for both. The cosines are the same in every frame.
+/// `fuzz_brdf` with one exponential for both and all that is known of the view drawn together. The cosines are the same
+/// in every frame.
 ///
-/// Cost on GCN: 22 instructions (4 at a quarter of the rate).
+/// Cost on GCN: 19 instructions (4 at a quarter of the rate).
 inline FuzzLight fuzz_light(
     FuzzView view,
     float n_u,
@@ -607,13 +611,12 @@ inline FuzzLight fuzz_light(
     float u_v
 ) {
     float penetrated = metal::exp2(view.exponent / n_u);
-    float w = 2.000002 + (2.0 * u_v);
-    float s = t_u + view.t_v;
-    float k = 1.0 - view.alpha_sqr;
-    float m = ((s * s) * k) + (view.alpha_sqr * w);
     float scattered = 1.0 - (penetrated * view.escaped);
-    float lobe = ((((view.scale * scattered) * w) * w) * metal::rsqrt(1.0 - ((t_u * t_u) * k))) / ((m * m) * (n_u + view.n_v));
-    return FuzzLight {lobe, penetrated};
+    float w = 1.000001 + u_v;
+    float s = t_u + view.t_v;
+    float m = ((s * s) * view.squeeze) + w;
+    float over_area = metal::rsqrt(view.root - ((t_u * t_u) * view.root_along));
+    return FuzzLight {(((w * w) * scattered) * over_area) / ((m * m) * (n_u + view.n_v)), penetrated};
 }
 
 /// Factor on the base's BRDF (slide: Base Layer, `c_atten`): `(P_p + c_f (1 - P_p) P_s) P_e`, for the share `penetrated`
@@ -692,7 +695,11 @@ struct Float3x9Array {
 #endif
 
 /// Nodes of the ambient table along each of its sides, the first and the last at the ends of their ranges.
-constant uint FUZZ_TABLE_SIZE = 64u;
+constant uint FUZZ_TABLE_SIZE = 48u;
+
+/// Fibres of a smaller alpha are combed: six coefficients miss P_s by more than 0.09 and eight the ambient light by more
+/// than 14 %. `fibre_p_s` and the table take their places.
+constant float FUZZ_COMBED_ALPHA = 0.3;
 
 /// Mean over the hemisphere of the layer's BRDF times cosine over phase (slide: Ambient Lighting, `G~`), for a view at
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
@@ -768,7 +775,7 @@ inline metal::float2 fuzz_ambient_place(
 ) {
     float sines = metal::sqrt(metal::max((1.0 - (n_v * n_v)) * (1.0 - (t_n * t_n)), 0.000000000001));
     float azimuth = metal::saturate(0.5 + ((0.5 * (t_v - (n_v * t_n))) / sines));
-    return (metal::float2(n_v, azimuth) * (1.0 - 0.015625)) + metal::float2(0.5 * 0.015625);
+    return (metal::float2(n_v, azimuth) * (1.0 - 0.020833334)) + metal::float2(0.5 * 0.020833334);
 }
 
 /// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a
@@ -837,7 +844,7 @@ inline metal::float3 fuzz_ambient_attenuation(
 
 // Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
 // Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
-// Made from src/fuzz_deferred.wesl, by ./x shaders. Needs: fuzz_layer, fuzz_phase
+// Made from src/fuzz_deferred.wesl, by ./x shaders. Needs: fuzz_layer
 
 // Fuzz by seven bits of a G-buffer: fixed fibres over Lambert, for moss and felt.
 //
@@ -862,6 +869,9 @@ constant float FUZZ_DEFERRED_ALBEDO = 5.0;
 /// How far light wraps around the terminator, as a cosine.
 constant float FUZZ_WRAP = 0.2;
 
+/// `(1+n)/(2 (1+w)^(1+n))` for n = 2: with it the wrapped cosine integrates to π over the sphere.
+constant float FUZZ_WRAP_SCALE = 0.86805546;
+
 /// The cosine of light and normal, softened by wrapping (McAuley 2013; slide: Deferred), n = 2:
 /// `(1+n)/(2(1+w)) (max(n_u + w, 0)/(1+w))^n`. Its integral over the sphere is π. Where no light arrives it is 1e-8
 /// rather than zero, so that the layer may divide by it.
@@ -871,7 +881,7 @@ inline float fuzz_wrap(
     float n_u
 ) {
     float c = metal::max(n_u + FUZZ_WRAP, 0.0001);
-    return (0.86805546 * c) * c;
+    return (FUZZ_WRAP_SCALE * c) * c;
 }
 
 /// P_e of the deferred layer, once a pixel.
@@ -886,20 +896,26 @@ inline float fuzz_deferred_escape(
 
 /// BRDF times cosine of the deferred layer for a fibre albedo of one, from the cosines of light and view with the normal
 /// and with each other and `fuzz_deferred_escape`. Lights down to `n_u = -FUZZ_WRAP` reach it. The picture is
-/// `lerp(Lambert, this, fuzziness)`; the base is not shadowed.
+/// `lerp(Lambert, this, fuzziness)`; the base is not shadowed. It is `fibre_phase` and `fuzz_layer` times cosine with
+/// `fuzz_wrap` for the light's cosine, every constant factor drawn into another.
 ///
-/// Cost on GCN: 28 instructions (5 at a quarter of the rate).
+/// Cost on GCN: 23 instructions (4 at a quarter of the rate).
 inline float fuzz_deferred(
     float n_u,
     float n_v,
     float u_v,
     float escaped
 ) {
-    float _e4 = fuzz_wrap(n_u);
-    float _e6 = fuzz_passage(FUZZ_DEFERRED_DENSITY, _e4);
-    float passed = _e6 * escaped;
-    float _e9 = fibre_phase(u_v, n_u, n_v, FUZZ_DEFERRED_ALPHA);
-    return ((_e9 * (1.0 - passed)) * _e4) / (_e4 + n_v);
+    float c = metal::max(n_u + FUZZ_WRAP, 0.0001);
+    float wrapped = c * c;
+    float _e11 = fuzz_passage(0.57600003, wrapped);
+    float passed = _e11 * escaped;
+    float w = 1.000001 + u_v;
+    float s = n_u + n_v;
+    float m = ((s * s) * 0.055555534) + w;
+    float over_area = metal::rsqrt(142.1223 - ((n_u * n_u) * 14.212225));
+    float above = (((w * w) * wrapped) * (1.0 - passed)) * over_area;
+    return above / ((m * m) * (wrapped + (n_v * 1.1520001)));
 }
 
 /// Albedo of the fibres over a Lambert base of albedo `base`: `5 base`, as the talk has it, but no more than the layer

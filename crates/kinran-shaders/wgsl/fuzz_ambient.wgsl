@@ -57,7 +57,11 @@ fn fuzz_ambient_factor(coefficients: array<f32, 8>, n_v: f32, t_v: f32) -> f32 {
 }
 
 /// Nodes of the ambient table along each of its sides, the first and the last at the ends of their ranges.
-const FUZZ_TABLE_SIZE: u32 = 64u;
+const FUZZ_TABLE_SIZE: u32 = 48u;
+
+/// Fibres of a smaller alpha are combed: six coefficients miss P_s by more than 0.09 and eight the ambient light by more
+/// than 14 %. `fibre_p_s` and the table take their places.
+const FUZZ_COMBED_ALPHA: f32 = 0.3;
 
 /// Texture coordinates in the table that replaces `fuzz_ambient_factor` for combed fibres, of FUZZ_TABLE_SIZE texels a
 /// side: x runs with `n_v` from 0 to 1, y with the cosine of the azimuth between view and fibre. `t_n` is `t·n`.

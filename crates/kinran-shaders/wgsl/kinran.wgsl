@@ -393,10 +393,12 @@ struct FuzzView {
     escaped: f32,
     /// `-d log2(e)`.
     exponent: f32,
-    /// `α²`.
-    alpha_sqr: f32,
-    /// `α³ / 4π`.
-    scale: f32,
+    /// `(1-α²) / 2α²`.
+    squeeze: f32,
+    /// `(4π α)²`.
+    root: f32,
+    /// `(4π α)² (1-α²)`.
+    root_along: f32,
 }
 
 /// What the layer makes of a light.
@@ -409,27 +411,29 @@ struct FuzzLight {
 
 /// Prepares `fuzz_light` for a view at cosine `n_v` > 0 to the normal and `t_v` to the fibres.
 ///
-/// Cost on GCN: 7 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 fn fuzz_view(n_v: f32, t_v: f32, density: f32, alpha: f32) -> FuzzView {
     let exponent = -1.44269504 * density;
     let alpha_sqr = alpha * alpha;
-    return FuzzView(n_v, t_v, exp2(exponent / n_v), exponent, alpha_sqr, alpha_sqr * alpha * 0.0795774715);
+    let k = 1.0 - alpha_sqr;
+    let root = 157.91367 * alpha_sqr;
+    return FuzzView(n_v, t_v, exp2(exponent / n_v), exponent, 0.5 * k / alpha_sqr, root, root * k);
 }
 
 /// Lobe and penetration for a light at cosines `n_u` > 0 to the normal, `t_u` to the fibres and `u_v` to the view:
-/// `fuzz_brdf` with one exponential for both. The cosines are the same in every frame.
+/// `fuzz_brdf` with one exponential for both and all that is known of the view drawn together. The cosines are the same
+/// in every frame.
 ///
-/// Cost on GCN: 22 instructions (4 at a quarter of the rate).
+/// Cost on GCN: 19 instructions (4 at a quarter of the rate).
 fn fuzz_light(view: FuzzView, n_u: f32, t_u: f32, u_v: f32) -> FuzzLight {
     let penetrated = exp2(view.exponent / n_u);
-    // |u + v|², kept above zero where v = -u.
-    let w = 2.000002 + 2.0 * u_v;
-    let s = t_u + view.t_v;
-    let k = 1.0 - view.alpha_sqr;
-    let m = s * s * k + view.alpha_sqr * w;
     let scattered = 1.0 - penetrated * view.escaped;
-    let lobe = view.scale * scattered * w * w * inverseSqrt(1.0 - t_u * t_u * k) / (m * m * (n_u + view.n_v));
-    return FuzzLight(lobe, penetrated);
+    // The phase is `(w/m)² / (4π α sqrt(1 - k t_u²))` with half of |u + v|² for w, kept above zero where v = -u.
+    let w = 1.000001 + u_v;
+    let s = t_u + view.t_v;
+    let m = s * s * view.squeeze + w;
+    let over_area = inverseSqrt(view.root - t_u * t_u * view.root_along);
+    return FuzzLight(w * w * scattered * over_area / (m * m * (n_u + view.n_v)), penetrated);
 }
 
 /// Factor on the base's BRDF (slide: Base Layer, `c_atten`): `(P_p + c_f (1 - P_p) P_s) P_e`, for the share `penetrated`
@@ -510,7 +514,11 @@ fn fuzz_ambient_factor(coefficients: array<f32, 8>, n_v: f32, t_v: f32) -> f32 {
 }
 
 /// Nodes of the ambient table along each of its sides, the first and the last at the ends of their ranges.
-const FUZZ_TABLE_SIZE: u32 = 64u;
+const FUZZ_TABLE_SIZE: u32 = 48u;
+
+/// Fibres of a smaller alpha are combed: six coefficients miss P_s by more than 0.09 and eight the ambient light by more
+/// than 14 %. `fibre_p_s` and the table take their places.
+const FUZZ_COMBED_ALPHA: f32 = 0.3;
 
 /// Texture coordinates in the table that replaces `fuzz_ambient_factor` for combed fibres, of FUZZ_TABLE_SIZE texels a
 /// side: x runs with `n_v` from 0 to 1, y with the cosine of the azimuth between view and fibre. `t_n` is `t·n`.
@@ -566,7 +574,7 @@ fn fuzz_ambient_attenuation(escaped: f32, q: f32, downward: f32, fibre_color: ve
 
 // Kinran shader library. SPDX-License-Identifier: MIT OR Apache-2.0
 // Copyright (c) the Kinran authors. Paste what you need; keep these two lines.
-// Made from src/fuzz_deferred.wesl, by ./x shaders. Needs: fuzz_layer, fuzz_phase
+// Made from src/fuzz_deferred.wesl, by ./x shaders. Needs: fuzz_layer
 
 // Fuzz by seven bits of a G-buffer: fixed fibres over Lambert, for moss and felt.
 //
@@ -585,15 +593,17 @@ const FUZZ_DEFERRED_ALBEDO: f32 = 5.0;
 /// How far light wraps around the terminator, as a cosine.
 const FUZZ_WRAP: f32 = 0.2;
 
+/// `(1+n)/(2 (1+w)^(1+n))` for n = 2: with it the wrapped cosine integrates to π over the sphere.
+const FUZZ_WRAP_SCALE: f32 = 3.0 / (2.0 * (1.0 + FUZZ_WRAP) * (1.0 + FUZZ_WRAP) * (1.0 + FUZZ_WRAP));
+
 /// The cosine of light and normal, softened by wrapping (McAuley 2013; slide: Deferred), n = 2:
 /// `(1+n)/(2(1+w)) (max(n_u + w, 0)/(1+w))^n`. Its integral over the sphere is π. Where no light arrives it is 1e-8
 /// rather than zero, so that the layer may divide by it.
 ///
 /// Cost on GCN: 4 instructions.
 fn fuzz_wrap(n_u: f32) -> f32 {
-    let scale = 3.0 / (2.0 * (1.0 + FUZZ_WRAP) * (1.0 + FUZZ_WRAP) * (1.0 + FUZZ_WRAP));
     let c = max(n_u + FUZZ_WRAP, 1e-4);
-    return scale * c * c;
+    return FUZZ_WRAP_SCALE * c * c;
 }
 
 /// P_e of the deferred layer, once a pixel.
@@ -605,13 +615,26 @@ fn fuzz_deferred_escape(n_v: f32) -> f32 {
 
 /// BRDF times cosine of the deferred layer for a fibre albedo of one, from the cosines of light and view with the normal
 /// and with each other and `fuzz_deferred_escape`. Lights down to `n_u = -FUZZ_WRAP` reach it. The picture is
-/// `lerp(Lambert, this, fuzziness)`; the base is not shadowed.
+/// `lerp(Lambert, this, fuzziness)`; the base is not shadowed. It is `fibre_phase` and `fuzz_layer` times cosine with
+/// `fuzz_wrap` for the light's cosine, every constant factor drawn into another.
 ///
-/// Cost on GCN: 28 instructions (5 at a quarter of the rate).
+/// Cost on GCN: 23 instructions (4 at a quarter of the rate).
 fn fuzz_deferred(n_u: f32, n_v: f32, u_v: f32, escaped: f32) -> f32 {
-    let wrapped = fuzz_wrap(n_u);
-    let passed = fuzz_passage(FUZZ_DEFERRED_DENSITY, wrapped) * escaped;
-    return fibre_phase(u_v, n_u, n_v, FUZZ_DEFERRED_ALPHA) * (1.0 - passed) * wrapped / (wrapped + n_v);
+    const alpha_sqr = FUZZ_DEFERRED_ALPHA * FUZZ_DEFERRED_ALPHA;
+    const k = 1.0 - alpha_sqr;
+    const root = 157.91367 * alpha_sqr;
+    // The wrapped cosine over its scale.
+    let c = max(n_u + FUZZ_WRAP, 1e-4);
+    let wrapped = c * c;
+    let passed = fuzz_passage(FUZZ_DEFERRED_DENSITY / FUZZ_WRAP_SCALE, wrapped) * escaped;
+
+    // The phase is `(w/m)² / (4π α sqrt(1 - k n_u²))` with half of |u + v|² for w, kept above zero where v = -u.
+    let w = 1.000001 + u_v;
+    let s = n_u + n_v;
+    let m = s * s * (0.5 * k / alpha_sqr) + w;
+    let over_area = inverseSqrt(root - n_u * n_u * (root * k));
+    let above = w * w * wrapped * (1.0 - passed) * over_area;
+    return above / (m * m * (wrapped + n_v * (1.0 / FUZZ_WRAP_SCALE)));
 }
 
 /// Albedo of the fibres over a Lambert base of albedo `base`: `5 base`, as the talk has it, but no more than the layer

@@ -669,8 +669,10 @@ fn places_of_the_ambient_table_run_with_the_azimuth() {
             for (azimuth, wanted) in [(0.0, 1.0), (PI / 2.0, 0.5), (PI, 0.0)] {
                 let v = direction(polar, azimuth);
                 let place = fuzz_ambient_place(v.z as f32, t.dot(v) as f32, t.z as f32);
-                close("y", place.y.into(), (wanted * 63.0 + 0.5) / 64.0, 2e-5, (tilt, polar, azimuth));
-                close("x", place.x.into(), (v.z * 63.0 + 0.5) / 64.0, 1e-6, v);
+                // The outer nodes lie at the middles of the outer texels.
+                let node = |at: f64| (at * f64::from(FUZZ_TABLE_SIZE - 1) + 0.5) / f64::from(FUZZ_TABLE_SIZE);
+                close("y", place.y.into(), node(wanted), 2e-5, (tilt, polar, azimuth));
+                close("x", place.x.into(), node(v.z), 1e-6, v);
             }
         }
     }
@@ -685,6 +687,20 @@ fn wrapped_light_is_as_much_as_unwrapped() {
     close("towards the light", fuzz_wrap(1.0).into(), 1.25, 1e-6, ());
     close("at the terminator", fuzz_wrap(0.0).into(), 0.034_722, 1e-6, ());
     assert!(fuzz_wrap(-0.3) < 1e-7, "light from behind");
+}
+
+#[test]
+fn the_deferred_layer_is_the_layer_of_its_constants_under_wrapped_light() {
+    for (theta_u, theta_v, phi) in [(0.3f64, 0.8, 1.0), (1.2, 0.1, 2.5), (1.7, 1.4, 0.2), (0.0, 1.5, 3.1)] {
+        let (u, v) = (direction(theta_u, 0.0), direction(theta_v, phi));
+        let (n_u, n_v, u_v) = (u.z as f32, v.z as f32, u.dot(v) as f32);
+        let wrapped = fuzz_wrap(n_u);
+        let passed = fuzz_passage(FUZZ_DEFERRED_DENSITY, wrapped) * fuzz_deferred_escape(n_v);
+        let phase = fibre_phase(u_v, n_u, n_v, FUZZ_DEFERRED_ALPHA);
+        let wanted = f64::from(fuzz_layer(phase, passed, wrapped, n_v) * wrapped);
+        let got = f64::from(fuzz_deferred(n_u, n_v, u_v, fuzz_deferred_escape(n_v)));
+        close("fuzz_deferred", got / wanted, 1.0, 1e-5, (u, v));
+    }
 }
 
 /// What the deferred layer returns to a view in a white furnace at a fibre albedo of one.

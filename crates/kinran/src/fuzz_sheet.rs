@@ -1,22 +1,27 @@
 //! `kinran fuzz`: a model with fibres on it, parameter by parameter, as the talk shows its velvety horse.
 
+use std::fmt::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::ValueEnum;
 use glam::{Vec2, Vec3, vec2, vec3};
+use kinran_bake::aniso::Filter;
 use kinran_image::{Channels, Image, Pixels, Transfer};
+use kinran_render::metrics::flip;
 use kinran_render::reference::{
     BoundTexture, MipTexture, RenderFuzz, RenderScene, Surroundings, TextureFiltering,
 };
-use kinran_scene::{Environment, Fuzz, FuzzAttenuation, FuzzLayer, Light, LightKind, Scene, Wrap};
+use kinran_scene::{Environment, Fuzz, FuzzAttenuation, FuzzLayer, Light, LightKind, Wrap};
 use kinran_shading::fuzz::fibre_direction;
 use kinran_shading::sh::sh_evaluate;
 use serde::Serialize;
 
+use crate::backend::{Backend, Painter};
 use crate::demo::noise::noise;
+use crate::model::Model;
 use crate::picture::{INK, PAPER, Picture};
-use crate::surfaces::{Mips, fuzz_coefficients, scene_surfaces};
+use crate::surfaces::{Mips, fuzz_fits, scene_surfaces};
 use crate::values::{number, vector};
 use crate::view::{View, ViewArgs, file_name};
 use crate::{Console, Error, Progress, outputs};
@@ -24,15 +29,18 @@ use crate::{Console, Error, Progress, outputs};
 /// Draws a model with fuzz, a sheet of pictures for each parameter
 ///
 /// Sheets: attenuation (no fuzz, base not attenuated, P_s = 0, full), density, spread, tilt, value and
-/// saturation of the fibres' colour, light (one light moving round; harmonics alone; the environment alone), simple
-/// (the form for seven bits of a G-buffer, off and on). Every material gets the same fibres.
+/// saturation of the fibres' colour, light (one light moving round; harmonics alone; the environment alone), probe (the
+/// environment in a smooth metal base, attenuated or not), simple (the form for seven bits of a G-buffer, off and on), and,
+/// where it is named, realtime (both renderers' pictures and FLIP, their mean difference, in direct light and in that of
+/// the environment, the layer lit along its lobe or as the talk has it). Every material gets the same fibres.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  kinran fuzz horse.gltf -o horse_fuzz/ --base 0.05,0.04,0.035
+  kinran fuzz horse.gltf -o horse_fuzz/ --base 0.05,0.004,0.008 --roughness 0.7 --color 0.9,0.25,0.3
   kinran fuzz curtain.gltf -o crushed/ --direction swirl --spread 0.1 --tilt 50 --color 0.5,0.05,0.1 --sheet light
-  kinran fuzz sofa.gltf -o felt/ --sheet simple")]
+  kinran fuzz sofa.gltf -o felt/ --sheet simple --backend gpu
+  kinran fuzz horse.gltf -o both/ --sheet realtime --spp 256 --size 128x128")]
 pub struct Args {
-    /// The .glb or .gltf file
+    /// The .glb or .gltf file, or a folder that holds one, or the textures that `kinran bake` wrote
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
@@ -40,7 +48,7 @@ pub struct Args {
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
 
-    /// Draws these sheets; all by default
+    /// Draws these sheets; all but realtime by default
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAMES")]
     pub sheet: Vec<Sheet>,
 
@@ -64,9 +72,17 @@ pub struct Args {
     #[arg(long, value_name = "R,G,B", value_parser = vector)]
     pub base: Option<Vec3>,
 
+    /// Roughness of the base, in the place of the file's, which is no metal then
+    #[arg(long, value_name = "R", value_parser = |t: &str| number(t, 0.0..=1.0))]
+    pub roughness: Option<f32>,
+
     /// Where fibres lean: as they do in the tangent frame, in noise, or in swirls
     #[arg(long, value_enum, default_value_t = Direction::Noise)]
     pub direction: Direction,
+
+    /// What draws: the reference renderer on the CPU, or a GPU by Vulkan
+    #[arg(long, value_enum, default_value_t = Backend::Cpu)]
+    pub backend: Backend,
 
     /// Samples in a pixel
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
@@ -88,7 +104,9 @@ pub enum Sheet {
     Value,
     Saturation,
     Light,
+    Probe,
     Simple,
+    Realtime,
 }
 
 /// A direction map made here.
@@ -106,10 +124,22 @@ pub enum Direction {
 const GAP: u32 = 10;
 const LABEL: u32 = 26;
 
+/// Pixels of a letter in a label, no less.
+const LETTER: u32 = 10;
+
 #[derive(Serialize)]
 struct Summary {
     files: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    flip: Vec<Difference>,
     warnings: Vec<String>,
+}
+
+/// A real-time picture against the reference.
+#[derive(Serialize)]
+struct Difference {
+    light: &'static str,
+    flip: f32,
 }
 
 /// The command.
@@ -123,59 +153,112 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             return Err(Error::Usage(format!("{flag} {x},{y},{z}: each must lie in 0 to 1")));
         }
     }
-    let scene = Scene::load(&args.file)?;
-    let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
+    let sheets = match args.sheet.as_slice() {
+        [] => Sheet::value_variants().iter().copied().filter(|&s| s != Sheet::Realtime).collect(),
+        named => named.to_vec(),
+    };
+    let painter = args.backend.open(None)?;
+    let realtime = match sheets.contains(&Sheet::Realtime) {
+        true => Some(Backend::Gpu.open(None)?),
+        false => None,
+    };
+    let Model { path, mut scene, only_baked } = Model::open(&args.file)?;
+    for material in &mut scene.materials {
+        if let Some(base) = args.base {
+            material.base_color_factor = base.extend(material.base_color_factor.w);
+            material.base_color = None;
+        }
+        if let Some(roughness) = args.roughness {
+            (material.metallic_factor, material.roughness_factor) = (0.0, roughness);
+            material.metallic_roughness = None;
+        }
+    }
+    let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
     let progress = console.progress();
-    let (surfaces, apart) =
-        scene_surfaces(&scene, Mips::Filtered(kinran_bake::aniso::Filter::Linear), &progress)?;
-    let warnings: Vec<String> = scene.warnings.iter().cloned().chain(apart).collect();
+    let mips = if only_baked { Mips::Baked } else { Mips::Filtered(Filter::Linear) };
+    let (surfaces, apart) = scene_surfaces(&scene, mips, &progress)?;
+    let prepared = view.scene(&scene, surfaces)?;
+    let left_out = painter.left_out(&view, &prepared);
+    let warnings: Vec<String> = scene.warnings.iter().cloned().chain(apart).chain(left_out).collect();
     warnings.iter().for_each(|w| console.warn(w));
-    let studio = Studio { args, prepared: view.scene(&scene, surfaces)?, view, progress: &progress };
+    let studio = Studio { args, prepared, view, painter, progress: &progress };
 
     std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
-    let all = Sheet::value_variants();
-    let mut files = Vec::new();
-    for &sheet in if args.sheet.is_empty() { all } else { &args.sheet } {
+    let mut text = String::new();
+    let (mut files, mut flip) = (Vec::new(), Vec::new());
+    for sheet in sheets {
         let name = format!("{}.png", sheet.to_possible_value().expect("no sheet is hidden").get_name());
-        studio.sheet(sheet)?.write(&args.output.join(&name))?;
+        let picture = match &realtime {
+            Some(gpu) if sheet == Sheet::Realtime => {
+                let picture;
+                (picture, flip) = studio.both(gpu)?;
+                picture
+            }
+            _ => studio.sheet(sheet)?,
+        };
+        picture.write(&args.output.join(&name))?;
         files.push(name);
     }
-    let text =
-        format!("{} sheets of {} are in {}", files.len(), file_name(&args.file), args.output.display());
-    console.result(&Summary { files, warnings }, &text)
+    for Difference { light, flip } in &flip {
+        writeln!(text, "FLIP {flip:.4}: {light}").expect("strings grow");
+    }
+    write!(text, "{} sheets of {} are in {}", files.len(), file_name(&args.file), args.output.display())
+        .expect("strings grow");
+    console.result(&Summary { files, flip, warnings }, &text)
+}
+
+/// What a picture shows.
+struct Shot {
+    name: String,
+    fuzz: Option<Fuzz>,
+    view: View,
+    /// A smooth metal takes the place of the base.
+    gloss: bool,
+    talk_ambient: bool,
 }
 
 struct Studio<'a> {
     args: &'a Args,
     prepared: RenderScene,
     view: View,
+    painter: Painter,
     progress: &'a Progress,
 }
 
 impl Studio<'_> {
-    /// Pictures under their labels, side by side.
-    fn sheet(&self, sheet: Sheet) -> Result<Picture, Error> {
-        let base = FuzzLayer {
+    fn layer(&self) -> FuzzLayer {
+        FuzzLayer {
             density: self.args.density,
             spread: self.args.spread,
             tilt: self.args.tilt.to_radians(),
             color: self.args.color,
             ..FuzzLayer::default()
-        };
-        let layer = |layer: FuzzLayer| Some(Fuzz::Layer(layer));
+        }
+    }
+
+    fn shot(&self, name: impl Into<String>, fuzz: Option<Fuzz>) -> Shot {
+        Shot { name: name.into(), fuzz, view: self.view.clone(), gloss: false, talk_ambient: false }
+    }
+
+    fn shots(&self, sheet: Sheet) -> Vec<Shot> {
+        let base = self.layer();
         let vary = |name: &str, values: [f32; 6], change: &dyn Fn(f32) -> FuzzLayer| -> Vec<_> {
-            values.into_iter().map(|x| (format!("{name} {x}"), layer(change(x)), self.view.clone())).collect()
+            let shot = |x| self.shot(format!("{name} {x}"), Some(Fuzz::Layer(change(x))));
+            values.into_iter().map(shot).collect()
         };
-        let attenuated = |name: &str, attenuation| {
-            (name.to_owned(), layer(FuzzLayer { attenuation, ..base.clone() }), self.view.clone())
-        };
-        let pictures = match sheet {
-            Sheet::Attenuation => vec![
-                ("no fuzz".to_owned(), None, self.view.clone()),
-                attenuated("base not attenuated", FuzzAttenuation::None),
+        let attenuations = || -> Vec<_> {
+            let attenuated = |name, attenuation| {
+                self.shot(name, Some(Fuzz::Layer(FuzzLayer { attenuation, ..base.clone() })))
+            };
+            vec![
+                self.shot("no fuzz", None),
+                attenuated("no attenuation", FuzzAttenuation::None),
                 attenuated("P_s = 0", FuzzAttenuation::Unscattered),
-                attenuated("P_s", FuzzAttenuation::Full),
-            ],
+                attenuated("full", FuzzAttenuation::Full),
+            ]
+        };
+        match sheet {
+            Sheet::Attenuation => attenuations(),
             Sheet::Density => vary("density", [0.0, 0.1, 0.2, 0.3, 0.4, 0.5], &|density| FuzzLayer {
                 density,
                 ..base.clone()
@@ -198,59 +281,112 @@ impl Studio<'_> {
                 FuzzLayer { color, ..base.clone() }
             }),
             Sheet::Light => {
-                self.lights().into_iter().map(|(name, view)| (name, layer(base.clone()), view)).collect()
+                let lit = |(name, view)| Shot { view, ..self.shot(name, Some(Fuzz::Layer(base.clone()))) };
+                self.lights().into_iter().map(lit).collect()
             }
-            Sheet::Simple => [0.0, 0.5, 1.0]
-                .into_iter()
-                .map(|fuzziness| {
-                    let simple = Fuzz::Simple { fuzziness, texture: None };
-                    (format!("fuzziness {fuzziness}"), Some(simple), self.view.clone())
-                })
-                .collect(),
-        };
-        let (width, height) = self.view.size;
-        let mut picture =
-            Picture::new(GAP + (width + GAP) * pictures.len() as u32, LABEL + height + GAP, PAPER);
-        for (i, (name, fuzz, view)) in pictures.into_iter().enumerate() {
-            let x = GAP + (width + GAP) * i as u32;
-            picture.text((x, 18), 15.0, INK, &name);
-            picture.draw(x, LABEL, &self.draw(&name, fuzz, &view)?);
+            Sheet::Probe => {
+                let view = View { lights: Vec::new(), ..self.view.clone() };
+                let alone = |shot| Shot { view: view.clone(), gloss: true, ..shot };
+                attenuations().into_iter().map(alone).collect()
+            }
+            Sheet::Simple => {
+                let simple = |fuzziness| Some(Fuzz::Simple { fuzziness, texture: None });
+                let shot = |f| self.shot(format!("fuzziness {f}"), simple(f));
+                [0.0, 0.5, 1.0].into_iter().map(shot).collect()
+            }
+            Sheet::Realtime => Vec::new(),
         }
-        Ok(picture)
     }
 
-    fn draw(&self, name: &str, fuzz: Option<Fuzz>, view: &View) -> Result<Picture, Error> {
+    fn sheet(&self, sheet: Sheet) -> Result<Picture, Error> {
+        let draw = |shot: Shot| Ok((self.draw(&self.painter, &shot)?, shot.name));
+        let pictures: Result<Vec<_>, Error> = self.shots(sheet).into_iter().map(draw).collect();
+        Ok(self.framed(&pictures?))
+    }
+
+    /// Both renderers: in direct light; in that of the environment, the layer lit along its lobe or as the talk has it.
+    fn both(&self, gpu: &Painter) -> Result<(Picture, Vec<Difference>), Error> {
+        let (width, height) = self.view.size;
+        let fuzz = || Some(Fuzz::Layer(self.layer()));
+        let direct = View { environment: None, ..self.view.clone() };
+        let around = View { lights: Vec::new(), ..self.view.clone() };
+        let (mut pictures, mut differences) = (Vec::new(), Vec::new());
+        let rows = [
+            ("direct light", direct, &["real time"][..]),
+            ("environment", around, &["along the lobe", "the talk's"]),
+        ];
+        for (light, view, drawn) in rows {
+            if view.lights.is_empty() && view.environment.is_none() {
+                continue;
+            }
+            let shot = Shot { view, ..self.shot(light, fuzz()) };
+            let reference = self.draw(&Painter::Cpu, &shot)?;
+            for name in drawn {
+                let talk_ambient = *name == "the talk's";
+                let shot = Shot { view: shot.view.clone(), talk_ambient, ..self.shot(*name, fuzz()) };
+                let picture = self.draw(gpu, &shot)?;
+                let flip = flip(&reference.pixels, &picture.pixels, width, height)?.mean;
+                let light = match (light, talk_ambient) {
+                    ("environment", false) => "environment, ours",
+                    ("environment", true) => "environment, the talk's",
+                    _ => light,
+                };
+                differences.push(Difference { light, flip });
+                pictures.push((picture, format!("{name}: FLIP {flip:.4}")));
+            }
+            let at = pictures.len() - drawn.len();
+            pictures.insert(at, (reference, format!("{light}, reference")));
+        }
+        if differences.is_empty() {
+            let fix = "leave --env none out, or give --light X,Y,Z";
+            return Err(Error::Usage(format!("--sheet realtime: no light to compare in; {fix}")));
+        }
+        Ok((self.framed(&pictures), differences))
+    }
+
+    /// Pictures under their labels, side by side.
+    fn framed(&self, pictures: &[(Picture, String)]) -> Picture {
+        let (width, height) = self.view.size;
+        let longest = pictures.iter().map(|(_, name)| name.chars().count() as u32).max().unwrap_or(0);
+        let step = GAP + width.max(LETTER * longest);
+        let mut picture = Picture::new(GAP + step * pictures.len() as u32, LABEL + height + GAP, PAPER);
+        for (i, (drawn, name)) in pictures.iter().enumerate() {
+            let x = GAP + step * i as u32;
+            picture.text((x, 18), 15.0, INK, name);
+            picture.draw(x, LABEL, drawn);
+        }
+        picture
+    }
+
+    fn draw(&self, painter: &Painter, shot: &Shot) -> Result<Picture, Error> {
         let mut scene = self.prepared.clone();
-        let direction = match &fuzz {
+        let direction = match &shot.fuzz {
             Some(Fuzz::Layer(layer)) => direction_map(self.args.direction, layer.tilt),
             _ => None,
         };
-        let fuzz = fuzz.map(|fuzz| RenderFuzz {
+        let fuzz = shot.fuzz.clone().map(|fuzz| RenderFuzz {
             fuzz,
             direction,
             color: None,
             amount: None,
-            coefficients: None,
-            talk_ambient: false,
+            fits: None,
+            talk_ambient: shot.talk_ambient,
         });
         for material in &mut scene.materials {
             material.fuzz.clone_from(&fuzz);
-            if let Some(base) = self.args.base {
-                material.base_color_factor = base.extend(material.base_color_factor.w);
-                material.base_color = None;
+            if shot.gloss {
+                // As smooth as shows a window's frame; chosen by eye.
+                (material.metallic_factor, material.roughness_factor) = (1.0, 0.2);
+                (material.metallic_roughness, material.surface) = (None, None);
             }
         }
-        scene.fit_fuzz(fuzz_coefficients);
-        scene.lights.clone_from(&view.lights);
-        scene.surroundings = view.environment.clone().map(|e| Arc::new(Surroundings::new(e)));
-        let film = view.render(
-            &scene,
-            name,
-            self.args.spp,
-            TextureFiltering::Mips { max_anisotropy: 16 },
-            self.progress,
-        )?;
-        Ok(Picture { width: film.width, height: film.height, pixels: view.display(&film) })
+        scene.fit_fuzz(fuzz_fits);
+        scene.lights.clone_from(&shot.view.lights);
+        scene.surroundings = shot.view.environment.clone().map(|e| Arc::new(Surroundings::new(e)));
+        let filtering = TextureFiltering::Mips { max_anisotropy: 16 };
+        let (spp, progress) = (self.args.spp, self.progress);
+        let film = painter.film(&shot.view, &scene, &shot.name, spp, filtering, progress)?;
+        Ok(Picture { width: film.width, height: film.height, pixels: shot.view.display(&film) })
     }
 
     /// One light from four sides, then none but the environment: its harmonics, and itself.
@@ -288,13 +424,13 @@ impl Studio<'_> {
 
 /// Directions in tangent space that repeat with the texture; tilts are about `tilt` radians.
 fn direction_map(direction: Direction, tilt: f32) -> Option<BoundTexture> {
-    const SIZE: u32 = 256;
+    const SIZE: u32 = 512;
     let turn = std::f32::consts::TAU;
     let fibre = |p: Vec2| match direction {
         Direction::Even => fibre_direction(tilt, 0.0),
         Direction::Noise => {
             let at = |cells: i32, seed| noise(p * cells as f32, [cells; 2], seed);
-            fibre_direction(tilt * (1.0 + 0.5 * at(64, 1)), turn * 0.25 * (at(16, 2) + at(64, 3)))
+            fibre_direction(tilt * (1.0 + 0.5 * at(256, 1)), turn * (0.03 * at(16, 2) + 0.3 * at(256, 3)))
         }
         Direction::Swirl => {
             let at = |cells: i32, seed| noise(p * cells as f32, [cells; 2], seed);

@@ -3,6 +3,7 @@
 //! Each command is a module: its flags (`Args`), the function that `main` calls (`run`), and the work itself
 //! as a function that other commands can call.
 
+mod backend;
 pub mod bake;
 pub mod cache;
 pub mod compare;

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use kinran_image::{Channels, Image, Pixels, write_exr, write_png};
-use kinran_render::reference::{Film, RenderScene, TextureFiltering};
+use kinran_render::reference::TextureFiltering;
 use kinran_scene::Scene;
 use serde::Serialize;
 
+pub use crate::backend::Backend;
 use crate::model::Model;
 use crate::skin::missing_curvature;
 use crate::surfaces::{Mips, scene_surfaces};
@@ -68,15 +69,6 @@ pub struct Args {
     pub view: ViewArgs,
 }
 
-/// What draws a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Backend {
-    /// [`kinran_render::reference`].
-    Cpu,
-    /// `kinran_render::realtime`.
-    Gpu,
-}
-
 fn mips(text: &str) -> Result<Mips, String> {
     if text == "none" {
         return Ok(Mips::Level0);
@@ -105,12 +97,7 @@ struct Summary {
 /// the file.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     outputs::check_file(&args.output, &["png", "exr"])?;
-    if args.backend == Backend::Gpu && cfg!(not(feature = "gpu")) {
-        let fix = "build it with `cargo build --release -p kinran --features gpu`, or use --backend cpu";
-        return Err(Error::Usage(format!(
-            "--backend gpu: this kinran was built without a GPU renderer; {fix}"
-        )));
-    }
+    let painter = args.backend.open(args.shaders.as_deref())?;
     let Model { path, scene, only_baked } = Model::open(&args.file)?;
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
     let own = Mips::of(&scene);
@@ -137,10 +124,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         Mips::Filtered(_) | Mips::Baked => TextureFiltering::Mips { max_anisotropy: args.max_anisotropy },
     };
     let prepared = view.scene(&scene, surfaces)?;
-    let film = match args.backend {
-        Backend::Cpu => view.render(&prepared, "render", args.spp, filtering, &progress)?,
-        Backend::Gpu => gpu_film(&view, &prepared, filtering, args, console)?,
-    };
+    painter.left_out(&view, &prepared).iter().for_each(|what| console.warn(what));
+    let film = painter.film(&view, &prepared, "render", args.spp, filtering, &progress)?;
     if outputs::has_extension(&args.output, "exr") {
         let pixels = Pixels::F32(film.pixels.into_flattened());
         write_exr(&args.output, &Image::new(film.width, film.height, Channels::Rgb, pixels)?)?;
@@ -167,36 +152,6 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         summary.filter
     );
     console.result(&summary, &text)
-}
-
-#[cfg(feature = "gpu")]
-fn gpu_film(
-    view: &View,
-    scene: &RenderScene,
-    filtering: TextureFiltering,
-    args: &Args,
-    console: &Console,
-) -> Result<Film, Error> {
-    use kinran_render::realtime::{Gpu, Realtime, Settings, ShaderSource, left_out};
-    let settings = Settings {
-        shadows: view.shadows,
-        reflections: view.env_samples > 0,
-        background: view.background,
-        ..Settings::default()
-    };
-    left_out(scene, &settings).iter().for_each(|what| console.warn(format!("--backend gpu: {what}")));
-    let gpu = Gpu::open()?;
-    let source = ShaderSource { folder: args.shaders.clone() };
-    // Nothing is shown on a display, so any format will do.
-    let renderer = Realtime::new(&gpu, &source, wgpu::TextureFormat::Rgba8Unorm)?;
-    let scene = renderer.load(scene, &renderer.light_of(scene), filtering);
-    let stage = console.progress().stage("render", u64::from(args.spp));
-    Ok(renderer.film(&scene, &view.camera, &settings, view.size, args.spp, &|_, _| stage.add(1))?)
-}
-
-#[cfg(not(feature = "gpu"))]
-fn gpu_film(_: &View, _: &RenderScene, _: TextureFiltering, _: &Args, _: &Console) -> Result<Film, Error> {
-    Err(Error::Internal("a build without a GPU renderer was asked for one".into()))
 }
 
 /// Triangles in the world, instances counted each.

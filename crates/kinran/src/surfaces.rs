@@ -1,18 +1,21 @@
 //! The textures that a renderer draws a scene's surfaces with.
 
-use std::sync::Arc;
+use std::f64::consts::FRAC_PI_2;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use kinran_bake::aniso::{
     Filter, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps, SurfaceOptions, TexelSpan,
     bake_surface,
 };
-use kinran_bake::fuzz_fit::{Phase, fuzz_fit};
+use kinran_bake::fuzz_fit::{FuzzFit, Phase, ambient_texels, fuzz_fit};
 use kinran_bake::{NoSurface, material_surface};
 use kinran_image::{Role, Texture, full_level_count, level_size};
 use kinran_render::reference::{
-    AnisoEncoding, BoundTexture, FuzzCoefficients, MipLevel, MipTexture, SurfaceTextures,
+    AnisoEncoding, BoundTexture, FUZZ_TILTS, FuzzCoefficients, FuzzFits, MipLevel, MipTexture,
+    SurfaceTextures,
 };
 use kinran_scene::{FuzzPhase, Material, Scene, TextureRef};
+use kinran_shading::fuzz::{FUZZ_COMBED_ALPHA, fuzz_alpha};
 use rayon::prelude::*;
 
 use crate::{Error, Progress};
@@ -232,18 +235,33 @@ fn separate_surface(
     ))
 }
 
-/// Coefficients of a layer of fibres at `tilt` radians from the normal, for
-/// [`RenderScene::fit_fuzz`](kinran_render::reference::RenderScene::fit_fuzz).
-pub fn fuzz_coefficients(phase: FuzzPhase, tilt: f32, spread: f32) -> FuzzCoefficients {
-    let phase = match phase {
+/// Coefficients of layers of fibres, for [`RenderScene::fit_fuzz`](kinran_render::reference::RenderScene::fit_fuzz): some
+/// 50 ms of one core, and 20 times that for combed fibres. The last ones are kept.
+pub fn fuzz_fits(phase: FuzzPhase, spread: f32) -> Arc<FuzzFits> {
+    static LAST: Mutex<Option<(FuzzPhase, f32, Arc<FuzzFits>)>> = Mutex::new(None);
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((of, at, fits)) = &*last
+        && (*of, *at) == (phase, spread)
+    {
+        return fits.clone();
+    }
+    let named = match phase {
         FuzzPhase::Fibre => Phase::Fibre,
         FuzzPhase::Velvet => Phase::Velvet,
     };
-    let fit = fuzz_fit(phase, tilt.into(), spread.into());
-    FuzzCoefficients {
-        p_s: fit.p_s.coefficients,
-        ambient: fit.ambient.coefficients,
-        direction: fit.direction.coefficients,
-        r: fit.r.coefficients[0],
-    }
+    let tilts: Vec<f64> = (0..FUZZ_TILTS).map(|i| FRAC_PI_2 * i as f64 / (FUZZ_TILTS - 1) as f64).collect();
+    let fits: Vec<FuzzFit> = tilts.par_iter().map(|&tilt| fuzz_fit(named, tilt, spread.into())).collect();
+    let combed = fuzz_alpha(spread) < FUZZ_COMBED_ALPHA;
+    let table = combed.then(|| {
+        tilts.par_iter().flat_map_iter(|&tilt| ambient_texels(named, tilt, spread.into())).collect()
+    });
+    let tilts = std::array::from_fn(|i| FuzzCoefficients {
+        p_s: fits[i].p_s.coefficients,
+        ambient: fits[i].ambient.coefficients,
+        direction: fits[i].direction.coefficients,
+        r: fits[i].r.coefficients[0],
+    });
+    let fits = Arc::new(FuzzFits { tilts, table });
+    *last = Some((phase, spread, fits.clone()));
+    fits
 }

@@ -11,7 +11,7 @@ use kinran_render::tonemap::{Tonemap, to_srgb8};
 use kinran_scene::{Camera, Environment, Light, LightKind, Scene};
 
 use crate::skin::{SkinArgs, attach_skin};
-use crate::surfaces::fuzz_coefficients;
+use crate::surfaces::fuzz_fits;
 use crate::values::{direction, number, size, vector};
 use crate::{Error, Progress};
 
@@ -275,7 +275,7 @@ impl View {
     /// Those of [`RenderScene::new`].
     pub fn scene(&self, scene: &Scene, surfaces: Vec<Option<SurfaceTextures>>) -> Result<RenderScene, Error> {
         let mut prepared = RenderScene::new(scene, surfaces, self.environment.clone())?;
-        prepared.fit_fuzz(fuzz_coefficients);
+        prepared.fit_fuzz(fuzz_fits);
         prepared.lights.clone_from(&self.lights);
         attach_skin(scene, &mut prepared, &self.skin)?;
         prepared.materials.iter_mut().filter_map(|m| m.detail.as_mut()).for_each(|d| d.shown = self.detail);

@@ -15,9 +15,9 @@ use kinran_shading::fuzz::{fuzz_alpha, fuzz_g, velvet_k};
 use serde::Serialize;
 
 pub use exact::{
-    Gathered, Phase, exponential_integral, fibre_p_s_exact, g_exact, gathered, p_s_exact, q_exact,
+    Fibres, Gathered, Phase, exponential_integral, fibre_p_s_exact, g_exact, gathered, p_s_exact, q_exact,
 };
-pub use table::{AmbientTable, TABLE_SIZE, ambient_table};
+pub use table::{AmbientTable, TABLE_SIZE, ambient_table, ambient_texels};
 
 use exact::gauss_legendre;
 use least_squares::{least_squares, minimax};
@@ -149,7 +149,8 @@ fn directional(phase: Phase, t: DVec3, alpha: f64) -> (Fitted<6>, Fitted<6>, Fit
         )
     };
     let few = half_hemisphere(12, 12);
-    let b: Vec<f64> = few.iter().map(|&(v, _)| gathered(phase, v, t, alpha, &[]).phase).collect();
+    let fibres = Fibres::new(phase, t, alpha);
+    let b: Vec<f64> = few.iter().map(|&(v, _)| fibres.gathered(v, &[]).phase).collect();
     let few_rows: Vec<_> =
         few.iter().zip(&b).map(|(&(v, weight), &b)| (six(v.z, t.dot(v)), b, weight)).collect();
     let b = errors(least_squares(few_rows.iter().copied()), few_rows.iter().copied(), |x| x);
@@ -185,6 +186,7 @@ fn ambient(phase: Phase, t: DVec3, alpha: f64) -> (Fitted<8>, Fitted<4>) {
     // Views: as many near grazing, where G changes fast, as above.
     const N_V: [f64; 10] = [N_V_MIN, 0.13, 0.18, 0.25, 0.35, 0.5, 0.65, 0.8, 0.92, 1.0];
     const AZIMUTHS: u32 = 13;
+    let fibres = Fibres::new(phase, t, alpha);
     let mut factors = Vec::new();
     let mut directions = Vec::new();
     for x in N_V {
@@ -193,7 +195,7 @@ fn ambient(phase: Phase, t: DVec3, alpha: f64) -> (Fitted<8>, Fitted<4>) {
             let r = libm::sqrt(1.0 - x * x);
             let v = dvec3(r * libm::cos(phi), r * libm::sin(phi), x);
             let c = t.dot(v);
-            let gathered = gathered(phase, v, t, alpha, &DENSITIES);
+            let gathered = fibres.gathered(v, &DENSITIES);
             for (&density, (light, moment)) in DENSITIES.iter().zip(gathered.layers) {
                 let g = f64::from(fuzz_g(density as f32, x as f32));
                 factors.push((eight(x, c), light / g, 1.0));

@@ -1,9 +1,11 @@
 //! The uniform and textures of a material's fuzz.
 
 use glam::{Mat3, Vec3};
+use half::f16;
 use kinran_scene::{Fuzz, FuzzAttenuation, FuzzPhase};
-use kinran_shading::fuzz::{fibre_direction, fuzz_alpha};
+use kinran_shading::fuzz::{FUZZ_TABLE_SIZE, fibre_direction, fuzz_alpha};
 
+use super::Gpu;
 use crate::reference::{BoundTexture, FUZZ_TILTS, RenderFuzz, RenderMaterial};
 
 /// Floats of the uniform that fuzz_surface.wgsl declares.
@@ -71,12 +73,45 @@ fn of_fuzz(fuzz: &RenderFuzz) -> Vec<f32> {
         layer.color,
         fibre_direction(layer.tilt, layer.azimuth),
     );
-    let coefficients = fuzz.coefficients.as_ref().expect("fit_fuzz comes before the GPU");
-    for c in coefficients.iter() {
+    let fits = fuzz.fits.as_ref().expect("fit_fuzz comes before the GPU");
+    for c in &fits.tilts {
         floats.extend(c.p_s);
         floats.extend([c.r, 0.0]);
         floats.extend(c.ambient);
         floats.extend(c.direction);
     }
     floats
+}
+
+/// A texture for the table of combed fibres, one for each material, that its fuzz may be another one later.
+pub(super) fn table_texture(gpu: &Gpu) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("fuzz table"),
+        size: TABLE,
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D3,
+        format: wgpu::TextureFormat::Rg16Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    })
+}
+
+const TABLE: wgpu::Extent3d = wgpu::Extent3d {
+    width: FUZZ_TABLE_SIZE,
+    height: FUZZ_TABLE_SIZE,
+    depth_or_array_layers: FUZZ_TILTS as u32,
+};
+
+/// Writes the table of a material that has one; others do not read it.
+pub(super) fn write_table(gpu: &Gpu, texture: &wgpu::Texture, m: &RenderMaterial) {
+    let fits = m.fuzz.as_ref().and_then(|fuzz| fuzz.fits.as_ref());
+    let Some(table) = fits.and_then(|fits| fits.table.as_ref()) else { return };
+    let texels: Vec<u8> = table.iter().flatten().flat_map(|&x| f16::from_f32(x).to_le_bytes()).collect();
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(4 * FUZZ_TABLE_SIZE),
+        rows_per_image: Some(FUZZ_TABLE_SIZE),
+    };
+    gpu.queue.write_texture(texture.as_image_copy(), &texels, layout, TABLE);
 }

@@ -19,11 +19,13 @@ struct Fuzz {
     color: vec3f,
     normal: vec3f,
     fibre: vec3f,
+    t_n: f32,
     v: vec3f,
     view: FuzzView,
     p_s: array<f32, 6>,
     downward: f32,
-    ambient: array<f32, 8>,
+    // The layer's ambient light over fuzz_g.
+    factor: f32,
     direction: array<f32, 4>,
 }
 
@@ -58,10 +60,10 @@ fn fuzz_over(fuzz: Fuzz, u: vec3f, base: vec3f, diffuse: vec3f) -> vec3f {
     let t_u = dot(fuzz.fibre, u);
     var layer = fuzz_light(fuzz.view, n_u, t_u, u_v);
     if fuzz.phase == 1u {
-        let p = velvet_phase(u_v, t_u, fuzz.view.t_v, velvet_k(fuzz.view.alpha_sqr));
+        let p = velvet_phase(u_v, t_u, fuzz.view.t_v, velvet_k(fuzz.alpha * fuzz.alpha));
         layer.lobe = fuzz_layer(p, layer.penetrated * fuzz.view.escaped, n_u, fuzz.view.n_v);
     }
-    let down = select(fuzz_p_s(fuzz.p_s, n_u, t_u), 0.0, fuzz.attenuation == 1u);
+    let down = fuzz_downward(fuzz, n_u, t_u);
     var left = fuzz_attenuation(layer.penetrated, fuzz.view.escaped, down, fuzz.color);
     if fuzz.attenuation > 1u {
         left = vec3f(fuzz_left(fuzz));
@@ -82,7 +84,7 @@ fn fuzz_over_skin(fuzz: Fuzz, u: vec3f, diffuse: vec3f, cosine: vec3f, gloss: ve
     }
     let n_u = clamp((cosine.r + cosine.g + cosine.b) / 3.0, 1e-4, 1.0);
     let penetrated = fuzz_passage(fuzz.amount, n_u);
-    let down = select(fuzz_p_s(fuzz.p_s, n_u, dot(fuzz.fibre, u)), 0.0, fuzz.attenuation == 1u);
+    let down = fuzz_downward(fuzz, n_u, dot(fuzz.fibre, u));
     var left = fuzz_attenuation(penetrated, fuzz.view.escaped, down, fuzz.color);
     if fuzz.attenuation > 1u {
         left = vec3f(fuzz_left(fuzz));
@@ -90,9 +92,20 @@ fn fuzz_over_skin(fuzz: Fuzz, u: vec3f, diffuse: vec3f, cosine: vec3f, gloss: ve
     return scattered * left + fuzz_over(fuzz, u, gloss, vec3f(0.0)) * direct;
 }
 
+// P_s: what a fibre sends down of a light. Combed fibres, which coefficients cannot follow, take the closed form.
+fn fuzz_downward(fuzz: Fuzz, n_u: f32, t_u: f32) -> f32 {
+    if fuzz.attenuation == 1u {
+        return 0.0;
+    }
+    if fuzz.phase == 0u && fuzz.alpha < FUZZ_COMBED_ALPHA {
+        return fibre_p_s(n_u, t_u, fuzz.t_n, fuzz.alpha);
+    }
+    return fuzz_p_s(fuzz.p_s, n_u, t_u);
+}
+
 // What attenuation by the layer's albedo leaves, or by nothing.
 fn fuzz_left(fuzz: Fuzz) -> f32 {
-    let gathered = fuzz_g(fuzz.amount, fuzz.view.n_v) * fuzz_ambient_factor(fuzz.ambient, fuzz.view.n_v, fuzz.view.t_v);
+    let gathered = fuzz_g(fuzz.amount, fuzz.view.n_v) * fuzz.factor;
     let albedo = min(gathered * max(fuzz.color.r, max(fuzz.color.g, fuzz.color.b)), 1.0);
     return select(1.0 - albedo, 1.0, fuzz.attenuation == 3u);
 }
@@ -116,7 +129,7 @@ fn fuzz_over_ambient(fuzz: Fuzz, diffuse: vec3f, specular: vec3f, irradiance: ar
     let n_v = fuzz.view.n_v;
     let t_v = fuzz.view.t_v;
     let towards = fuzz_ambient_direction(fuzz.direction, fuzz.normal, fuzz.v, fuzz.fibre);
-    let gathered = fuzz_g(fuzz.amount, n_v) * fuzz_ambient_factor(fuzz.ambient, n_v, t_v);
+    let gathered = fuzz_g(fuzz.amount, n_v) * fuzz.factor;
     var lobe = gathered * fuzz_ambient_radiance(radiance, towards);
     if fuzz.talk_ambient == 1u {
         // Least squares of the relative error for n·v from 0.1 and densities from 0.01 to 0.5.

@@ -1,5 +1,7 @@
 // Fuzz of a material at a point of a mesh.
 
+const FUZZ_TILTS: u32 = 17u;
+
 struct FuzzMaterial {
     // x kind, y phase, z attenuation, w 1: ambient light as the talk has it.
     flags: vec4u,
@@ -8,8 +10,8 @@ struct FuzzMaterial {
     color: vec4f,
     // Fibres in tangent space.
     direction: vec4f,
-    // For nine tilts from upright to lying: P_s and R, ambient factor, ambient direction.
-    coefficients: array<vec4f, 45>,
+    // For each tilt from upright to lying: P_s and R, ambient factor, ambient direction.
+    coefficients: array<vec4f, 5 * FUZZ_TILTS>,
     // Rows of the transforms of direction, colour and amount; w of the first row is the UV set.
     transforms: array<vec4f, 6>,
 }
@@ -21,6 +23,8 @@ struct FuzzMaterial {
 @group(1) @binding(21) var fuzz_direction_sampler: sampler;
 @group(1) @binding(22) var fuzz_color_sampler: sampler;
 @group(1) @binding(23) var fuzz_amount_sampler: sampler;
+// The ambient factor of combed fibres, a layer for each tilt.
+@group(1) @binding(27) var fuzz_table: texture_3d<f32>;
 
 fn fuzz_uv(in: Varying, texture: u32) -> vec2f {
     let row = fuzz_material.transforms[2u * texture];
@@ -59,8 +63,9 @@ fn fuzz_at(in: Varying, surface: Surface, to_world: mat3x3f, view: vec3f) -> Fuz
     fuzz.view = fuzz_view(n_v, dot(fuzz.fibre, view), fuzz.amount, fuzz.alpha);
 
     // Coefficients between those of the nearest tilts.
-    let place = acos(saturate(abs(t_n))) * (8.0 / (0.5 * PI));
-    let low = min(u32(place), 7u);
+    fuzz.t_n = abs(t_n);
+    let place = acos(saturate(fuzz.t_n)) * (f32(FUZZ_TILTS - 1u) / (0.5 * PI));
+    let low = min(u32(place), FUZZ_TILTS - 2u);
     let f = place - f32(low);
     let a = 5u * low;
     let down = mix(fuzz_material.coefficients[a], fuzz_material.coefficients[a + 5u], f);
@@ -70,8 +75,15 @@ fn fuzz_at(in: Varying, surface: Surface, to_world: mat3x3f, view: vec3f) -> Fuz
     let mean = mix(fuzz_material.coefficients[a + 4u], fuzz_material.coefficients[a + 9u], f);
     fuzz.p_s = array<f32, 6>(down.x, down.y, down.z, down.w, more.x, more.y);
     fuzz.downward = more.z;
-    fuzz.ambient =
-        array<f32, 8>(first.x, first.y, first.z, first.w, second.x, second.y, second.z, second.w);
+    if fuzz.alpha < FUZZ_COMBED_ALPHA {
+        let layer = (place + 0.5) / f32(FUZZ_TILTS);
+        let at = vec3f(fuzz_ambient_place(n_v, fuzz.view.t_v, fuzz.t_n), layer);
+        let texel = textureSampleLevel(fuzz_table, clamp_sampler, at, 0.0).xy;
+        fuzz.factor = fuzz_ambient_tabulated(texel, fuzz.amount, n_v);
+    } else {
+        let terms = array<f32, 8>(first.x, first.y, first.z, first.w, second.x, second.y, second.z, second.w);
+        fuzz.factor = fuzz_ambient_factor(terms, n_v, fuzz.view.t_v);
+    }
     fuzz.direction = array<f32, 4>(mean.x, mean.y, mean.z, mean.w);
     return fuzz;
 }

@@ -626,6 +626,11 @@ impl Layouts {
             view_dimension: wgpu::TextureViewDimension::D2,
             multisampled: false,
         };
+        let volume = BindingType::Texture {
+            sample_type: T::Float { filterable: true },
+            view_dimension: wgpu::TextureViewDimension::D3,
+            multisampled: false,
+        };
         let layout = |types: &[BindingType]| {
             let entry = |(i, &ty): (usize, &BindingType)| wgpu::BindGroupLayoutEntry {
                 binding: i as u32,
@@ -647,6 +652,7 @@ impl Layouts {
         material.extend([filtered; 3]);
         material.extend([smooth; 3]);
         material.extend([filtered; 3]);
+        material.push(volume);
         let mut detail = vec![uniform];
         detail.extend([filtered; detail::TEXTURES]);
         detail.extend([smooth; detail::SAMPLERS]);

@@ -38,6 +38,7 @@ pub(super) struct Draw {
 pub(super) struct Material {
     uniform: wgpu::Buffer,
     fuzz: wgpu::Buffer,
+    fuzz_table: wgpu::Texture,
     pub(super) bind_group: wgpu::BindGroup,
     pub(super) detail: Option<Detail>,
     pub(super) path: Path,
@@ -111,6 +112,7 @@ impl GpuScene {
         let floats = material_floats(material, adjustment, self.scene.geometry.curvature_range());
         gpu.queue.write_buffer(&self.materials[index].uniform, 0, &bytes(&floats));
         gpu.queue.write_buffer(&self.materials[index].fuzz, 0, &bytes(&fuzz::floats(material)));
+        fuzz::write_table(gpu, &self.materials[index].fuzz_table, material);
         if let (Some(there), Some(detail)) = (&self.materials[index].detail, &material.detail) {
             gpu.queue.write_buffer(&there.uniform, 0, &bytes(&detail::floats(detail)));
         }
@@ -431,6 +433,11 @@ fn material(
         let resource = wgpu::BindingResource::TextureView(table);
         entries.push(wgpu::BindGroupEntry { binding: entries.len() as u32, resource });
     }
+    let fuzz_table = fuzz::table_texture(textures.gpu);
+    fuzz::write_table(textures.gpu, &fuzz_table, m);
+    let view = fuzz_table.create_view(&wgpu::TextureViewDescriptor::default());
+    let resource = wgpu::BindingResource::TextureView(&view);
+    entries.push(wgpu::BindGroupEntry { binding: entries.len() as u32, resource });
     let bind_group = textures.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
         layout: &layouts.material,
@@ -457,6 +464,7 @@ fn material(
     Material {
         uniform,
         fuzz,
+        fuzz_table,
         bind_group,
         detail,
         path: path(m),

@@ -1,12 +1,14 @@
 //! A layer of fibres over a material, at a point.
 
-use glam::{Mat3, Vec3, Vec4Swizzles};
+use std::sync::Arc;
+
+use glam::{Mat3, Vec2, Vec3, Vec4Swizzles};
 use kinran_scene::{Fuzz, FuzzAttenuation, FuzzPhase};
 use kinran_shading::fuzz::{
-    FUZZ_DEFERRED_ALPHA, FUZZ_DEFERRED_DENSITY, FuzzView, fibre_direction, fibre_p_s, fuzz_alpha,
-    fuzz_ambient_factor, fuzz_attenuation, fuzz_deferred, fuzz_deferred_color, fuzz_deferred_escape, fuzz_g,
-    fuzz_layer, fuzz_light, fuzz_over_base_shares, fuzz_p_s, fuzz_passage, fuzz_smooth_normal, fuzz_view,
-    velvet_k, velvet_phase,
+    FUZZ_DEFERRED_ALPHA, FUZZ_DEFERRED_DENSITY, FUZZ_TABLE_SIZE, FuzzView, fibre_direction, fibre_p_s,
+    fuzz_alpha, fuzz_ambient_factor, fuzz_ambient_place, fuzz_ambient_tabulated, fuzz_attenuation,
+    fuzz_deferred, fuzz_deferred_color, fuzz_deferred_escape, fuzz_g, fuzz_layer, fuzz_light,
+    fuzz_over_base_shares, fuzz_p_s, fuzz_passage, fuzz_smooth_normal, fuzz_view, velvet_k, velvet_phase,
 };
 
 use super::geometry::SurfacePoint;
@@ -28,7 +30,55 @@ pub struct FuzzCoefficients {
 }
 
 /// Tilts, evenly from upright to lying, that a layer has coefficients for.
-pub const FUZZ_TILTS: usize = 9;
+pub const FUZZ_TILTS: usize = 17;
+
+/// Coefficients of a layer for all tilts, between which they are interpolated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FuzzFits {
+    /// For each of the tilts.
+    pub tilts: [FuzzCoefficients; FUZZ_TILTS],
+    /// For fibres of an alpha below [`FUZZ_COMBED_ALPHA`](kinran_shading::fuzz::FUZZ_COMBED_ALPHA): for each of the tilts the rows of a table for
+    /// `fuzz_ambient_tabulated`.
+    pub table: Option<Vec<[f32; 2]>>,
+}
+
+impl FuzzFits {
+    /// Where a fibre at a cosine to the normal lies between tilts: the lower one and the share of the next.
+    fn place(t_n: f32) -> (usize, f32) {
+        let place = libm::acosf(t_n.clamp(0.0, 1.0)) / std::f32::consts::FRAC_PI_2 * (FUZZ_TILTS - 1) as f32;
+        let low = (place as usize).min(FUZZ_TILTS - 2);
+        (low, place - low as f32)
+    }
+
+    /// `fuzz_p_s` at a cosine of fibre and normal.
+    fn p_s(&self, t_n: f32) -> [f32; 6] {
+        let (low, f) = Self::place(t_n);
+        let (a, b) = (&self.tilts[low].p_s, &self.tilts[low + 1].p_s);
+        std::array::from_fn(|i| a[i] + (b[i] - a[i]) * f)
+    }
+
+    /// The layer's ambient light over G, from the table if there is one.
+    pub fn ambient_factor(&self, density: f32, n_v: f32, t_v: f32, t_n: f32) -> f32 {
+        let (low, f) = Self::place(t_n);
+        let Some(table) = &self.table else {
+            let (a, b) = (&self.tilts[low].ambient, &self.tilts[low + 1].ambient);
+            return fuzz_ambient_factor(std::array::from_fn(|i| a[i] + (b[i] - a[i]) * f), n_v, t_v);
+        };
+        const SIZE: usize = FUZZ_TABLE_SIZE as usize;
+        const LAST: Vec2 = Vec2::splat((SIZE - 1) as f32);
+        let place = (fuzz_ambient_place(n_v, t_v, t_n) * SIZE as f32 - 0.5).clamp(Vec2::ZERO, LAST);
+        let cell = place.floor().min(LAST - 1.0);
+        let within = place - cell;
+        let tilt = |tilt: usize| {
+            let row = |y: usize| {
+                let start = (tilt * SIZE + cell.y as usize + y) * SIZE + cell.x as usize;
+                Vec2::from(table[start]).lerp(table[start + 1].into(), within.x)
+            };
+            row(0).lerp(row(1), within.y)
+        };
+        fuzz_ambient_tabulated(tilt(low).lerp(tilt(low + 1), f), density, n_v)
+    }
+}
 
 /// Fuzz with its textures.
 #[derive(Clone, Debug)]
@@ -41,9 +91,9 @@ pub struct RenderFuzz {
     pub color: Option<BoundTexture>,
     /// R: density of a layer, fuzziness of the simple form.
     pub amount: Option<BoundTexture>,
-    /// For each of the tilts. The reference asks for them for velvet and for attenuation by albedo, the GPU always; filled
-    /// by [`RenderScene::fit_fuzz`](super::RenderScene::fit_fuzz).
-    pub coefficients: Option<Box<[FuzzCoefficients; FUZZ_TILTS]>>,
+    /// The reference asks for them for velvet and for attenuation by albedo, the GPU always; filled by
+    /// [`RenderScene::fit_fuzz`](super::RenderScene::fit_fuzz).
+    pub fits: Option<Arc<FuzzFits>>,
     /// The GPU lights the layer from all around as the talk does, not along its lobe.
     pub talk_ambient: bool,
 }
@@ -56,22 +106,6 @@ impl RenderFuzz {
                 layer.phase == FuzzPhase::Fibre && layer.attenuation != FuzzAttenuation::Albedo
             }
             Fuzz::Simple { .. } => true,
-        }
-    }
-
-    /// Coefficients at a cosine of fibre and normal, between those of the nearest tilts.
-    fn coefficients_at(&self, t_n: f32) -> FuzzCoefficients {
-        let zero = FuzzCoefficients { p_s: [0.0; 6], ambient: [0.0; 8], direction: [0.0; 4], r: 0.0 };
-        let Some(table) = &self.coefficients else { return zero };
-        let place = libm::acosf(t_n.clamp(0.0, 1.0)) / std::f32::consts::FRAC_PI_2 * (FUZZ_TILTS - 1) as f32;
-        let low = (place as usize).min(FUZZ_TILTS - 2);
-        let f = place - low as f32;
-        let (a, b) = (&table[low], &table[low + 1]);
-        FuzzCoefficients {
-            p_s: std::array::from_fn(|i| a.p_s[i] + (b.p_s[i] - a.p_s[i]) * f),
-            ambient: std::array::from_fn(|i| a.ambient[i] + (b.ambient[i] - a.ambient[i]) * f),
-            direction: std::array::from_fn(|i| a.direction[i] + (b.direction[i] - a.direction[i]) * f),
-            r: a.r + (b.r - a.r) * f,
         }
     }
 }
@@ -143,20 +177,21 @@ impl FuzzAt {
         let n_v = n.dot(v).max(N_V_MIN);
         let alpha = fuzz_alpha(layer.spread);
         let color = layer.color * sample(&fuzz.color, point, filtering).xyz();
-        let coefficients = fuzz.coefficients_at(t.dot(n));
-        let albedo = fuzz_g(density, n_v) * fuzz_ambient_factor(coefficients.ambient, n_v, t.dot(v));
+        let (t_n, t_v) = (t.dot(n), t.dot(v));
+        let factor = fuzz.fits.as_ref().map_or(0.0, |fits| fits.ambient_factor(density, n_v, t_v, t_n));
+        let albedo = fuzz_g(density, n_v) * factor;
         Some(FuzzAt {
             n,
             t,
             v,
             color,
-            view: fuzz_view(n_v, t.dot(v), density, alpha),
+            view: fuzz_view(n_v, t_v, density, alpha),
             density,
             alpha,
             kind: Kind::Layer {
                 phase: layer.phase,
                 attenuation: layer.attenuation,
-                p_s: coefficients.p_s,
+                p_s: fuzz.fits.as_ref().map_or([0.0; 6], |fits| fits.p_s(t_n)),
                 albedo: (albedo * color.max_element()).min(1.0),
             },
         })

@@ -22,7 +22,7 @@ mod texture;
 pub use bvh::{Bvh, Hit};
 pub use camera::{CameraRay, PictureCamera, frame_box, look_at};
 pub use detail::{DetailShown, RenderDetail, RenderDetailLayer};
-pub use fuzz::{FUZZ_TILTS, FuzzCoefficients, RenderFuzz};
+pub use fuzz::{FUZZ_TILTS, FuzzCoefficients, FuzzFits, RenderFuzz};
 pub use geometry::{FLAT, Geometry, MAX_TRIANGLES, SurfacePoint};
 pub use render::{Background, Film, Settings, TextureFiltering, render};
 pub use scene::{

@@ -192,7 +192,7 @@ fn check(camera: &Camera, settings: &Settings) -> Result<(), Error> {
 }
 
 fn check_fuzz(scene: &RenderScene) -> Result<(), Error> {
-    let is_fitted = |fuzz: &RenderFuzz| fuzz.is_exact() || fuzz.coefficients.is_some();
+    let is_fitted = |fuzz: &RenderFuzz| fuzz.is_exact() || fuzz.fits.is_some();
     match scene.materials.iter().position(|m| m.fuzz.as_ref().is_some_and(|fuzz| !is_fitted(fuzz))) {
         Some(i) => Err(Error::Scene(format!("the fuzz of material {i} has no coefficients; call fit_fuzz"))),
         None => Ok(()),

@@ -1,15 +1,14 @@
 //! A scene as the renderer needs it.
 
-use super::{
-    FUZZ_TILTS, FuzzCoefficients, Geometry, MipTexture, RenderDetail, RenderDetailLayer, RenderFuzz,
-    RenderSkin,
-};
+use super::{FuzzFits, Geometry, MipTexture, RenderDetail, RenderDetailLayer, RenderFuzz, RenderSkin};
 use crate::Error;
 use glam::{Mat3, Vec2, Vec3, Vec4};
-use kinran_image::Transfer;
+use kinran_image::{Channels, Image, Pixels, Transfer};
 use kinran_scene::{
-    AlphaMode, Detail, DetailMap, Environment, Fuzz, FuzzPhase, Light, Material, Scene, TextureRef,
+    AlphaMode, Detail, DetailMap, Environment, Fuzz, FuzzDirection, FuzzLayer, FuzzPhase, Light, Material,
+    Scene, TextureRef,
 };
+use kinran_shading::fuzz::fibre_direction;
 use kinran_shading::sh::{Sh9, sh_convolve_cosine, sh_evaluate};
 use kinran_shading::skin::lighting::skin_irradiance;
 use std::{collections::HashMap, sync::Arc};
@@ -185,13 +184,11 @@ impl RenderScene {
         })
     }
 
-    /// Gives every layer of fibres coefficients that `fit` makes for its phase, tilts in radians and its spread.
-    pub fn fit_fuzz(&mut self, fit: impl Fn(FuzzPhase, f32, f32) -> FuzzCoefficients) {
+    /// Gives every layer of fibres the coefficients that `fit` makes for its phase and spread.
+    pub fn fit_fuzz(&mut self, fit: impl Fn(FuzzPhase, f32) -> Arc<FuzzFits>) {
         for fuzz in self.materials.iter_mut().filter_map(|m| m.fuzz.as_mut()) {
             if let Fuzz::Layer(layer) = &fuzz.fuzz {
-                let tilt = |i: usize| std::f32::consts::FRAC_PI_2 * i as f32 / (FUZZ_TILTS - 1) as f32;
-                let of_tilt = |i| fit(layer.phase, tilt(i), layer.spread);
-                fuzz.coefficients = Some(Box::new(std::array::from_fn(of_tilt)));
+                fuzz.fits = Some(fit(layer.phase, layer.spread));
             }
         }
     }
@@ -245,6 +242,24 @@ impl TextureLoader<'_> {
         Ok(BoundTexture::new(self.loaded[&key].clone(), place))
     }
 
+    /// Directions of fibres as vectors, whatever the texture holds: angles cannot be averaged.
+    fn fibres(&mut self, place: &TextureRef, encoding: FuzzDirection) -> Result<BoundTexture, Error> {
+        let held = self.texture(place, Transfer::Linear)?;
+        if encoding == FuzzDirection::Vector {
+            return Ok(held);
+        }
+        let level = &held.texture.levels[0];
+        let vectors = level.texels.iter().flat_map(|[tilt, azimuth, ..]| {
+            let fibre = fibre_direction(tilt * std::f32::consts::FRAC_PI_2, azimuth * std::f32::consts::TAU);
+            (fibre * 0.5 + 0.5).to_array()
+        });
+        let pixels = Pixels::F32(vectors.collect());
+        let image = Image::new(level.width, level.height, Channels::Rgb, pixels)
+            .map_err(|e| Error::Scene(format!("image {}: {e}", place.image)))?;
+        let texture = MipTexture::from_image(&image, Transfer::Linear, place.wrap);
+        Ok(BoundTexture::new(Arc::new(texture), place))
+    }
+
     /// Maps blended from tiles.
     fn detail(&mut self, detail: &Detail) -> Result<RenderDetail, Error> {
         let mut load = |place: Option<&TextureRef>, transfer| {
@@ -270,6 +285,12 @@ impl TextureLoader<'_> {
 
     fn material(&mut self, m: &Material, surface: Option<SurfaceTextures>) -> Result<RenderMaterial, Error> {
         let detail = m.detail.as_ref().map(|detail| self.detail(detail)).transpose()?;
+        let fibres = match &m.fuzz {
+            Some(Fuzz::Layer(FuzzLayer { direction_texture: Some(place), direction_encoding, .. })) => {
+                Some(self.fibres(place, *direction_encoding)?)
+            }
+            _ => None,
+        };
         let mut load = |place: &Option<TextureRef>, transfer| {
             place.as_ref().map(|place| self.texture(place, transfer)).transpose()
         };
@@ -300,16 +321,16 @@ impl TextureLoader<'_> {
             fuzz: match &m.fuzz {
                 None => None,
                 Some(fuzz) => {
-                    let (direction, color, amount) = match fuzz {
-                        Fuzz::Layer(l) => (&l.direction_texture, &l.color_texture, &l.density_texture),
-                        Fuzz::Simple { texture, .. } => (&None, &None, texture),
+                    let (color, amount) = match fuzz {
+                        Fuzz::Layer(l) => (&l.color_texture, &l.density_texture),
+                        Fuzz::Simple { texture, .. } => (&None, texture),
                     };
                     Some(RenderFuzz {
                         fuzz: fuzz.clone(),
-                        direction: load(direction, Transfer::Linear)?,
+                        direction: fibres,
                         color: load(color, Transfer::Srgb)?,
                         amount: load(amount, Transfer::Linear)?,
-                        coefficients: None,
+                        fits: None,
                         talk_ambient: false,
                     })
                 }

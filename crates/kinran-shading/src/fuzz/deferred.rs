@@ -1,7 +1,7 @@
 //! Fuzz by seven bits of a G-buffer: fixed fibres over Lambert, for moss and felt (slide: Deferred).
 
-use super::phase::fibre_phase;
-use crate::fuzz::layer::fuzz_passage;
+use crate::{fuzz::layer::fuzz_passage, sqrt::sqrt};
+use core::f32::consts::PI;
 use glam::Vec3;
 
 /// Density of the layer.
@@ -17,13 +17,15 @@ pub const FUZZ_DEFERRED_ALBEDO: f32 = 5.0;
 /// How far light wraps around the terminator, as a cosine.
 pub const FUZZ_WRAP: f32 = 0.2;
 
+/// `(1+n)/(2 (1+w)^(1+n))` for n = 2: with it the wrapped cosine integrates to π over the sphere.
+pub const FUZZ_WRAP_SCALE: f32 = 3.0 / (2.0 * (1.0 + FUZZ_WRAP) * (1.0 + FUZZ_WRAP) * (1.0 + FUZZ_WRAP));
+
 /// The cosine of light and normal, softened by wrapping (McAuley 2013; slide: Deferred), n = 2:
 /// `(1+n)/(2(1+w)) (max(n_u + w, 0)/(1+w))^n`. Its integral over the sphere is π, that of the clamped cosine.
 /// Where no light arrives it is 1e-8 rather than zero, so that the layer may divide by it.
 pub fn fuzz_wrap(n_u: f32) -> f32 {
-    const SCALE: f32 = 3.0 / (2.0 * (1.0 + FUZZ_WRAP) * (1.0 + FUZZ_WRAP) * (1.0 + FUZZ_WRAP));
     let c = (n_u + FUZZ_WRAP).max(1e-4);
-    SCALE * c * c
+    FUZZ_WRAP_SCALE * c * c
 }
 
 /// P_e of the deferred layer, once a pixel.
@@ -34,10 +36,24 @@ pub fn fuzz_deferred_escape(n_v: f32) -> f32 {
 /// BRDF times cosine of the deferred layer for a fibre albedo of one, from the cosines of light and view with
 /// the normal and with each other and [`fuzz_deferred_escape`]. Lights down to `n_u = -FUZZ_WRAP` reach it.
 /// The picture is `lerp(Lambert, this, fuzziness)`; the base is not shadowed.
+///
+/// [`fibre_phase`](super::fibre_phase) and [`fuzz_layer`](super::fuzz_layer) times cosine with [`fuzz_wrap`] for the
+/// light's cosine, every constant factor drawn into another.
 pub fn fuzz_deferred(n_u: f32, n_v: f32, u_v: f32, escaped: f32) -> f32 {
-    let wrapped = fuzz_wrap(n_u);
-    let passed = fuzz_passage(FUZZ_DEFERRED_DENSITY, wrapped) * escaped;
-    fibre_phase(u_v, n_u, n_v, FUZZ_DEFERRED_ALPHA) * (1.0 - passed) * wrapped / (wrapped + n_v)
+    const ALPHA_SQR: f32 = FUZZ_DEFERRED_ALPHA * FUZZ_DEFERRED_ALPHA;
+    const K: f32 = 1.0 - ALPHA_SQR;
+    const ROOT: f32 = 16.0 * PI * PI * ALPHA_SQR;
+    // The wrapped cosine over its scale.
+    let c = (n_u + FUZZ_WRAP).max(1e-4);
+    let wrapped = c * c;
+    let passed = fuzz_passage(FUZZ_DEFERRED_DENSITY / FUZZ_WRAP_SCALE, wrapped) * escaped;
+
+    // The phase is `(w/m)² / (4π α sqrt(1 - k n_u²))` with half of |u + v|² for w, kept above zero where v = -u.
+    let w = 1.000_001 + u_v;
+    let s = n_u + n_v;
+    let m = s * s * (0.5 * K / ALPHA_SQR) + w;
+    let area = sqrt(ROOT - n_u * n_u * (ROOT * K));
+    w * w * wrapped * (1.0 - passed) / (m * m * (wrapped + n_v * (1.0 / FUZZ_WRAP_SCALE)) * area)
 }
 
 /// Albedo of the fibres over a Lambert base of albedo `base`: `5 base`, as the talk has it, but no more than the

@@ -65,10 +65,12 @@ pub struct FuzzView {
     pub escaped: f32,
     /// `-d log2(e)`.
     pub exponent: f32,
-    /// `α²`.
-    pub alpha_sqr: f32,
-    /// `α³ / 4π`.
-    pub scale: f32,
+    /// `(1-α²) / 2α²`.
+    pub squeeze: f32,
+    /// `(4π α)²`.
+    pub root: f32,
+    /// `(4π α)² (1-α²)`.
+    pub root_along: f32,
 }
 
 /// What the layer makes of a light.
@@ -84,28 +86,31 @@ pub struct FuzzLight {
 pub fn fuzz_view(n_v: f32, t_v: f32, density: f32, alpha: f32) -> FuzzView {
     let exponent = -LOG2_E * density;
     let alpha_sqr = alpha * alpha;
+    let k = 1.0 - alpha_sqr;
+    let root = 16.0 * PI * PI * alpha_sqr;
     FuzzView {
         n_v,
         t_v,
         escaped: libm::exp2f(exponent / n_v),
         exponent,
-        alpha_sqr,
-        scale: alpha_sqr * alpha / (4.0 * PI),
+        squeeze: 0.5 * k / alpha_sqr,
+        root,
+        root_along: root * k,
     }
 }
 
 /// Lobe and penetration for a light at cosines `n_u` > 0 to the normal, `t_u` to the fibres and `u_v` to the
-/// view: [`fuzz_brdf`] with one exponential for both. The cosines are the same in every frame.
+/// view: [`fuzz_brdf`] with one exponential for both and all that is known of the view drawn together. The cosines
+/// are the same in every frame.
 pub fn fuzz_light(view: FuzzView, n_u: f32, t_u: f32, u_v: f32) -> FuzzLight {
     let penetrated = libm::exp2f(view.exponent / n_u);
-    // |u + v|², kept above zero where v = -u.
-    let w = 2.000_002 + 2.0 * u_v;
-    let s = t_u + view.t_v;
-    let k = 1.0 - view.alpha_sqr;
-    let m = s * s * k + view.alpha_sqr * w;
-    let area = sqrt(1.0 - t_u * t_u * k);
     let scattered = 1.0 - penetrated * view.escaped;
-    FuzzLight { lobe: view.scale * scattered * w * w / (m * m * (n_u + view.n_v) * area), penetrated }
+    // The phase is `(w/m)² / (4π α sqrt(1 - k t_u²))` with half of |u + v|² for w, kept above zero where v = -u.
+    let w = 1.000_001 + u_v;
+    let s = t_u + view.t_v;
+    let m = s * s * view.squeeze + w;
+    let area = sqrt(view.root - t_u * t_u * view.root_along);
+    FuzzLight { lobe: w * w * scattered / (m * m * (n_u + view.n_v) * area), penetrated }
 }
 
 /// Factor on the base's BRDF (slide: Base Layer, `c_atten`): `(P_p + c_f (1 - P_p) P_s) P_e`, for the share

@@ -21,13 +21,13 @@ mod phase;
 mod sampling;
 
 pub use ambient::{
-    FUZZ_TABLE_SIZE, fuzz_ambient_attenuation, fuzz_ambient_direction, fuzz_ambient_factor,
-    fuzz_ambient_mean, fuzz_ambient_place, fuzz_ambient_radiance, fuzz_ambient_tabulated, fuzz_g,
-    fuzz_g_talk, fuzz_q, fuzz_q_talk,
+    FUZZ_COMBED_ALPHA, FUZZ_TABLE_SIZE, fuzz_ambient_attenuation, fuzz_ambient_direction,
+    fuzz_ambient_factor, fuzz_ambient_mean, fuzz_ambient_place, fuzz_ambient_radiance,
+    fuzz_ambient_tabulated, fuzz_g, fuzz_g_talk, fuzz_q, fuzz_q_talk,
 };
 pub use deferred::{
-    FUZZ_DEFERRED_ALBEDO, FUZZ_DEFERRED_ALPHA, FUZZ_DEFERRED_DENSITY, FUZZ_WRAP, fuzz_deferred,
-    fuzz_deferred_color, fuzz_deferred_escape, fuzz_wrap, fuzziness_code, fuzziness_from_code,
+    FUZZ_DEFERRED_ALBEDO, FUZZ_DEFERRED_ALPHA, FUZZ_DEFERRED_DENSITY, FUZZ_WRAP, FUZZ_WRAP_SCALE,
+    fuzz_deferred, fuzz_deferred_color, fuzz_deferred_escape, fuzz_wrap, fuzziness_code, fuzziness_from_code,
 };
 pub use layer::{
     FuzzLight, FuzzView, fuzz_attenuation, fuzz_brdf, fuzz_layer, fuzz_light, fuzz_passage,

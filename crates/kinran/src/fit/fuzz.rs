@@ -41,7 +41,7 @@ pub struct FuzzArgs {
     #[arg(long, value_enum, value_name = "LANGUAGE")]
     pub lang: Option<FuzzLanguage>,
 
-    /// Writes the ambient factor as a table too, an EXR of 64 × 64 texels for `fuzz_ambient_tabulated`: for
+    /// Writes the ambient factor as a table too, an EXR of 48 × 48 texels for `fuzz_ambient_tabulated`: for
     /// spreads below 0.09, where the polynomial is off by more than 15 %
     #[arg(long, value_name = "FILE")]
     pub table: Option<PathBuf>,

@@ -1,14 +1,12 @@
 //! Sliders of a material's fuzz.
 
-use std::sync::Mutex;
-
 use eframe::egui::{self, Slider, Ui};
 use glam::Vec3;
-use kinran_render::reference::{FUZZ_TILTS, FuzzCoefficients, RenderFuzz};
+use kinran_render::reference::RenderFuzz;
 use kinran_scene::{Fuzz, FuzzAttenuation, FuzzLayer, FuzzPhase};
 use serde::{Deserialize, Serialize};
 
-use crate::surfaces::fuzz_coefficients;
+use crate::surfaces::fuzz_fits;
 
 /// What [`FuzzParameters::kind`] counts.
 const KINDS: [&str; 3] = ["none", "layer", "simple"];
@@ -84,7 +82,7 @@ impl FuzzParameters {
             2 => Fuzz::Simple { fuzziness: self.fuzziness, texture: None },
             _ => return None,
         };
-        let coefficients = (self.kind == 1).then(|| coefficients(phase, self.spread));
+        let fits = (self.kind == 1).then(|| fuzz_fits(phase, self.spread));
         let texture = |of: fn(&RenderFuzz) -> &Option<kinran_render::reference::BoundTexture>| {
             loaded.as_ref().and_then(|loaded| of(loaded).clone())
         };
@@ -93,7 +91,7 @@ impl FuzzParameters {
             direction: texture(|f| &f.direction),
             color: texture(|f| &f.color),
             amount: texture(|f| &f.amount),
-            coefficients,
+            fits,
             talk_ambient: self.talk_ambient,
         })
     }
@@ -133,28 +131,6 @@ impl FuzzParameters {
     }
 }
 
-type Coefficients = Box<[FuzzCoefficients; FUZZ_TILTS]>;
-
-/// The last fit, since every other slider leaves it as it is.
-static LAST: Mutex<Option<(FuzzPhase, f32, Coefficients)>> = Mutex::new(None);
-
-fn coefficients(phase: FuzzPhase, spread: f32) -> Coefficients {
-    let Ok(mut last) = LAST.lock() else { return fit(phase, spread) };
-    match &*last {
-        Some((of, at, coefficients)) if *of == phase && *at == spread => coefficients.clone(),
-        _ => {
-            let coefficients = fit(phase, spread);
-            *last = Some((phase, spread, coefficients.clone()));
-            coefficients
-        }
-    }
-}
-
-fn fit(phase: FuzzPhase, spread: f32) -> Coefficients {
-    let tilt = |i: usize| std::f32::consts::FRAC_PI_2 * i as f32 / (FUZZ_TILTS - 1) as f32;
-    Box::new(std::array::from_fn(|i| fuzz_coefficients(phase, tilt(i), spread)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -169,14 +145,14 @@ mod tests {
                 direction: None,
                 color: None,
                 amount: None,
-                coefficients: None,
+                fits: None,
                 talk_ambient: true,
             });
             let drawn = FuzzParameters::from(&loaded).fuzz(&loaded).unwrap();
             match (&drawn.fuzz, &fuzz) {
                 (Fuzz::Layer(got), Fuzz::Layer(want)) => {
                     assert!((got.tilt - want.tilt).abs() < 1e-6 && got.density == want.density);
-                    assert!(got.attenuation == want.attenuation && drawn.coefficients.is_some());
+                    assert!(got.attenuation == want.attenuation && drawn.fits.is_some());
                 }
                 (got, want) => assert_eq!(got, want),
             }

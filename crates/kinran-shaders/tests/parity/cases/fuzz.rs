@@ -65,7 +65,7 @@ fn coefficients<const N: usize>() -> Argument {
 
 /// Members of a [`FuzzView`].
 fn view() -> Argument {
-    let mut argument = argument::<6>(&[], |r| {
+    let mut argument = argument::<7>(&[], |r| {
         let (n_v, t_v) = (r.f32().max(0.01), r.f32() * 2.0 - 1.0);
         of_view(fuzz::fuzz_view(n_v, t_v, r.f32().max(0.01), r.f32().max(0.1)))
     });
@@ -75,7 +75,7 @@ fn view() -> Argument {
 }
 
 fn of_view(v: FuzzView) -> Vec<f32> {
-    vec![v.n_v, v.t_v, v.escaped, v.exponent, v.alpha_sqr, v.scale]
+    vec![v.n_v, v.t_v, v.escaped, v.exponent, v.squeeze, v.root, v.root_along]
 }
 
 fn random_numbers() -> Argument {
@@ -172,10 +172,11 @@ pub(super) fn cases() -> Vec<Case> {
                     t_v: x[1],
                     escaped: x[2],
                     exponent: x[3],
-                    alpha_sqr: x[4],
-                    scale: x[5],
+                    squeeze: x[4],
+                    root: x[5],
+                    root_along: x[6],
                 };
-                let light = fuzz::fuzz_light(view, x[6], x[7], x[8]);
+                let light = fuzz::fuzz_light(view, x[7], x[8], x[9]);
                 vec![light.lobe, light.penetrated]
             },
         ),
