@@ -270,11 +270,11 @@ impl Studio<'_> {
                 tilt: tilt.to_radians(),
                 ..base.clone()
             }),
-            Sheet::Value => vary("fibre value", [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], &|value| {
+            Sheet::Value => vary("value", [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], &|value| {
                 let color = base.color / base.color.max_element().max(1e-6) * value;
                 FuzzLayer { color, ..base.clone() }
             }),
-            Sheet::Saturation => vary("fibre saturation", [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], &|saturation| {
+            Sheet::Saturation => vary("saturation", [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], &|saturation| {
                 // Red of the base's value.
                 let value = base.color.max_element();
                 let color = value * Vec3::ONE.lerp(vec3(1.0, 0.05, 0.02), saturation);
@@ -434,7 +434,7 @@ fn direction_map(direction: Direction, tilt: f32) -> Option<BoundTexture> {
         }
         Direction::Swirl => {
             let at = |cells: i32, seed| noise(p * cells as f32, [cells; 2], seed);
-            fibre_direction(tilt * (1.0 + 0.3 * at(8, 1)), turn * (at(4, 2) + 0.3 * at(8, 3)))
+            fibre_direction(tilt * (1.0 + 0.3 * at(24, 1)), turn * (0.8 * at(10, 2) + 0.4 * at(24, 3)))
         }
     };
     if direction == Direction::Even {

@@ -108,9 +108,21 @@ pub struct Fibres {
     phase: Phase,
     t: DVec3,
     alpha: f64,
-    /// For each row of lights its height, weight, and for each light in it the direction, its cosine with the fibres and
-    /// what [`Phase::of_light`] makes of it.
-    rows: Vec<(f64, f64, Vec<(DVec3, f64, f64)>)>,
+    rows: Vec<Row>,
+}
+
+/// Lights of one height.
+struct Row {
+    z: f64,
+    weight: f64,
+    ring: Vec<LightOnFibres>,
+}
+
+struct LightOnFibres {
+    u: DVec3,
+    t_u: f64,
+    /// What [`Phase::of_light`] makes of it, with the rest of the integral's weight.
+    scale: f64,
 }
 
 impl Fibres {
@@ -123,9 +135,9 @@ impl Fibres {
             let light = |&(cos, sin): &(f64, f64)| {
                 let u = DVec3::new(r * cos, r * sin, z);
                 let t_u = t.dot(u);
-                (u, t_u, phase.of_light(t_u, alpha) * scale)
+                LightOnFibres { u, t_u, scale: phase.of_light(t_u, alpha) * scale }
             };
-            (z, weight, ring.iter().map(light).collect())
+            Row { z, weight, ring: ring.iter().map(light).collect() }
         });
         Fibres { phase, t, alpha, rows: rows.collect() }
     }
@@ -136,12 +148,12 @@ impl Fibres {
         let t_v = self.t.dot(v);
         let mut phase = 0.0;
         let mut layers = vec![(0.0, DVec3::ZERO); densities.len()];
-        for (z, weight, ring) in &self.rows {
+        for Row { z, weight, ring } in &self.rows {
             let (mut total, mut along) = (0.0, DVec3::ZERO);
-            for &(u, t_u, of_light) in ring {
+            for &LightOnFibres { u, t_u, scale } in ring {
                 let s = t_u + t_v;
                 let w = (2.0 + 2.0 * u.dot(v)).max(1e-12);
-                let p = of_light * self.phase.of_half(s * s, w, self.alpha);
+                let p = scale * self.phase.of_half(s * s, w, self.alpha);
                 total += p;
                 along += u * p;
             }
