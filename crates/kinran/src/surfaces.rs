@@ -236,7 +236,7 @@ fn separate_surface(
 }
 
 /// Coefficients of layers of fibres, for [`RenderScene::fit_fuzz`](kinran_render::reference::RenderScene::fit_fuzz): some
-/// 50 ms of one core, and 20 times that for combed fibres. The last ones are kept.
+/// 200 ms of one core, and 1.6 s more for combed fibres. The last ones are kept.
 pub fn fuzz_fits(phase: FuzzPhase, spread: f32) -> Arc<FuzzFits> {
     static LAST: Mutex<Option<(FuzzPhase, f32, Arc<FuzzFits>)>> = Mutex::new(None);
     let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
