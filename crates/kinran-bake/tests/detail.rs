@@ -2,8 +2,8 @@
 
 use glam::{Vec2, vec2, vec3};
 use kinran_bake::detail::{
-    Blend, DetailOptions, Layer, LayerTransform, MapKind, Mask, Target, Tile, TileOptions, compare, solve,
-    synthesize,
+    Blend, DetailOptions, FADE_TRIALS, Layer, LayerTransform, MapKind, Mask, Target, Tile, TileOptions,
+    bearable_opacity, compare, solve, synthesize,
 };
 use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset};
 
@@ -266,6 +266,27 @@ fn bytes_do_not_depend_on_threads() {
     let (one, four) = (run(1), run(4));
     assert_eq!(one.texture, four.texture);
     assert_eq!(one.levels, four.levels);
+}
+
+/// A bar that stops half-way, or runs on at 100 %.
+#[test]
+fn progress_counts_every_texel_once() {
+    use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+    let told = AtomicU64::new(0);
+    let progress = |texels: u64| {
+        told.fetch_add(texels, Relaxed);
+    };
+    let texels = |side: u64| (0..=side.ilog2()).map(|level| (side >> level).pow(2)).sum::<u64>();
+    let tile = Tile::bake(&scan(128, 128, 11), TileOptions::new(MapKind::Color, BC1), &progress).unwrap();
+    assert_eq!(told.swap(0, Relaxed), texels(128), "of a tile");
+    let (target, layers) = (target(&scan(64, 64, 3), MapKind::Color), [Layer::new(&tile)]);
+    solve(&target, &layers, &options(BC1), &progress).unwrap();
+    assert_eq!(told.swap(0, Relaxed), texels(64), "of a solution");
+    compare(&target, &layers, &options(BC1), &progress).unwrap();
+    assert_eq!(told.swap(0, Relaxed), 5 * texels(64), "of a comparison");
+    bearable_opacity(&target, &layers, &options(BC1), &progress).unwrap();
+    let (faded, most) = (told.swap(0, Relaxed), FADE_TRIALS * (64 * 64 + 32 * 32));
+    assert!(faded > 0 && faded <= most, "of fading: {faded} of {most}");
 }
 
 #[test]
