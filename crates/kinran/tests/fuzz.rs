@@ -392,8 +392,9 @@ mod realtime {
     /// `kinran fuzz --sheet realtime` on the assets that the pictures show.
     #[test]
     fn velvety_horse_and_crushed_velvet_are_near_the_reference() {
-        if device().is_none() {
-            return;
+        if let Err(e) = Gpu::open() {
+            assert!(std::env::var_os("KINRAN_REQUIRE_GPU").is_none(), "{e}");
+            return println!("SKIPPED: {e}");
         }
         let assets = std::env::var_os("KINRAN_ASSETS").map_or_else(
             || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/assets"),
@@ -411,7 +412,7 @@ mod realtime {
             let (model, out) = (assets.join(model), folder.path().to_string_lossy().into_owned());
             let model = model.to_string_lossy();
             // Few samples: docs/fuzz.md has the figures of 256. Their noise counts as difference too.
-            let flags = "--sheet realtime --size 96x96 --spp 32 --light=-0.6,0.7,0.5 --base 0.05,0.01,0.015 \
+            let flags = "--sheet realtime --size 96x96 --spp 16 --light=-0.6,0.7,0.5 --base 0.05,0.01,0.015 \
                 --roughness 0.7";
             let arguments = flags.split_whitespace().chain(fibres.split_whitespace());
             let arguments: Vec<&str> =
