@@ -55,6 +55,10 @@ pub struct Args {
     #[arg(long, value_name = "PNG")]
     pub screenshot: Option<PathBuf>,
 
+    /// Frames of which a still picture is made; fewer are done sooner, more are smoother
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub spp: u32,
+
     #[command(flatten)]
     #[allow(missing_docs)]
     pub view: ViewArgs,
@@ -102,6 +106,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         parameters,
         shaders: args.shaders.clone(),
         screenshot: args.screenshot.clone(),
+        spp: args.spp,
     };
     let created = eframe::run_native(
         "kinran",

@@ -125,7 +125,8 @@ impl Drop for Window<'_> {
 impl<'a> Window<'a> {
     fn open(display: &'a Display, args: &[&str]) -> Self {
         let process = Command::new(env!("CARGO_BIN_EXE_kinran"))
-            .args(["view", "--window", &format!("{WIDTH}x{HEIGHT}")])
+            // Few frames: the picture is compared with itself.
+            .args(["view", "--spp", "8", "--window", &format!("{WIDTH}x{HEIGHT}")])
             .args(args)
             .env("DISPLAY", &display.name)
             .env("WINIT_X11_SCALE_FACTOR", "1")

@@ -22,9 +22,6 @@ use crate::render::write_rgb8;
 use crate::surfaces::Mips;
 use crate::view::{EnvironmentChoice, ViewArgs, file_name};
 
-/// Frames after which a still picture is smooth; chosen by eye.
-const FRAMES: u32 = 64;
-
 /// How often the shader folder is looked at.
 const SHADER_INTERVAL: Duration = Duration::from_millis(300);
 
@@ -44,6 +41,8 @@ pub(super) struct Start {
     pub(super) parameters: Parameters,
     pub(super) shaders: Option<PathBuf>,
     pub(super) screenshot: Option<PathBuf>,
+    /// Frames after which a still picture is smooth.
+    pub(super) spp: u32,
 }
 
 /// One side of the split line.
@@ -89,6 +88,7 @@ pub(super) struct App {
     title: String,
     help: bool,
     screenshot: Option<PathBuf>,
+    spp: u32,
     closing: Arc<Mutex<bool>>,
     outcome: Arc<Mutex<Outcome>>,
 }
@@ -149,6 +149,7 @@ impl App {
             title: String::new(),
             help: false,
             screenshot: start.screenshot,
+            spp: start.spp,
             closing: Arc::default(),
             outcome,
         })
@@ -247,7 +248,9 @@ impl App {
         self.busy.is_empty()
             && self.loader.baking().is_none()
             && (0..sides).all(|i| {
-                self.sides[i].as_ref().is_some_and(|s| s.mips == Some(wanted[i]) && s.target.frames >= FRAMES)
+                self.sides[i]
+                    .as_ref()
+                    .is_some_and(|s| s.mips == Some(wanted[i]) && s.target.frames >= self.spp)
             })
     }
 
@@ -344,7 +347,7 @@ impl App {
             side.target.clear(&renderer);
             side.mips = mips;
         }
-        if side.target.frames < FRAMES {
+        if side.target.frames < self.spp {
             renderer.draw(scene, &orbit.camera(), &settings, &mut side.target);
             renderer.show(&side.target, &side.view, scene);
             if let Some(model) = self.model.as_mut().filter(|model| model.first_picture.is_none()) {
@@ -680,7 +683,7 @@ impl eframe::App for App {
                 .as_ref()
                 .map_or_else(Vec::new, |m| m.scenes.keys().copied().collect::<Vec<_>>()),
             frames: self.sides[0].as_ref().map_or(0, |side| side.target.frames),
-            frames_wanted: FRAMES,
+            frames_wanted: self.spp,
             first_picture: self.model.as_ref().and_then(|model| model.first_picture),
         };
         let (parameters, material) = (&mut self.parameters, &mut self.material);
