@@ -149,7 +149,8 @@ const TAPS: u32 = 8u;
 // environment filtered to its share of the lobe (Krivanek, Colbert 2008). One frame's taps cover the lobe, so that it is
 // smooth by itself; the n-th frame's are as narrow as those of n frames need be, so that their mean goes to the lobe's
 // own. Taps count as differences to one lookup over the whole lobe, a control variate, so that a frame's light is right in
-// the mean and exact where light is the same all around. They come in pairs half a turn apart: a tangent that turns round at a seam of the mesh changes nothing.
+// the mean and exact where light is the same all around. They come in pairs half a turn apart: a tangent that turns round
+// at a seam of the mesh changes nothing.
 fn ambient(surface: Surface, lobe: Lobe) -> vec3f {
     if frame.counts.y == 0u {
         return vec3f(0.0);

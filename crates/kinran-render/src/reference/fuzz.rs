@@ -37,8 +37,8 @@ pub const FUZZ_TILTS: usize = 17;
 pub struct FuzzFits {
     /// For each of the tilts.
     pub tilts: [FuzzCoefficients; FUZZ_TILTS],
-    /// For fibres of an alpha below [`FUZZ_COMBED_ALPHA`](kinran_shading::fuzz::FUZZ_COMBED_ALPHA): for each of the tilts the rows of a table for
-    /// `fuzz_ambient_tabulated`.
+    /// For an alpha below [`FUZZ_COMBED_ALPHA`](kinran_shading::fuzz::FUZZ_COMBED_ALPHA), of either phase: for each of
+    /// the tilts the rows of a table for `fuzz_ambient_tabulated`.
     pub table: Option<Vec<[f32; 2]>>,
 }
 
