@@ -1,7 +1,8 @@
 //! A whole 4096² bake, PNG files in to KTX2 files out, beside the bare block encoders on the same pixels.
 //!
 //! Run with `cargo bench -p kinran-bake --bench whole_bake`; `KINRAN_SIDE` sets another size. Each row is the
-//! fastest of three runs, in seconds of wall time, on one thread and on two. A bare row compresses, level by
+//! fastest of five runs, in seconds of wall time, on one thread and on two; a bake and the encoders that it is held
+//! against run in turns, so that a machine whose speed swings does so for both. A bare row compresses, level by
 //! level, exactly the bytes that the bake under it compresses, with the same encoders and presets: the
 //! defaults of `Role`, portable BC5 at "fast" and ISPC BC7 at "very fast".
 #![allow(clippy::print_stdout, reason = "the table is the result")]
@@ -20,69 +21,78 @@ use rayon::prelude::*;
 /// Zstandard level of the files, the command line's default.
 const ZSTD: i32 = 3;
 
+/// Runs of each row.
+const RUNS: usize = 5;
+
 fn main() {
     let side: u32 = std::env::var("KINRAN_SIDE").ok().and_then(|s| s.parse().ok()).unwrap_or(4096);
     let folder = tempfile::tempdir().expect("a temporary folder");
     write_maps(folder.path(), side);
     let sheets = sheets();
 
-    println!("{side}² normal (BC5) and aniso (BC7) map, all levels; fastest of 3, seconds of wall time");
+    println!("{side}² normal (BC5) and aniso (BC7) map, all levels; fastest of {RUNS}, seconds of wall time");
     println!(
         "{:24} {:>9} {:>9} {:>7} {:>9} {:>9}",
         "", "1 thread", "2 threads", "gain", "x bare, 1", "x bare, 2"
     );
     for filter in [Filter::Linear, Filter::Ml] {
         let pixels = pixels(folder.path(), filter);
-        let name = filter.name();
-        let bare = row(&format!("bare encoders, {name}"), None, || {
+        let bare = || {
             for (request, texture) in sheets.iter().zip(&pixels) {
                 for level in &texture.levels {
                     let data = encode_parallel(request.encoding, &level.data, level.width, level.height);
                     std::hint::black_box(data.expect("encoded"));
                 }
             }
-        });
-        row(&format!("bake, {name}"), Some(bare), || {
-            write(folder.path(), &bake(&load(folder.path()), filter, &sheets));
-        });
+        };
+        let whole = || write(folder.path(), &bake(&load(folder.path()), filter, &sheets));
+        let [bare, whole] = in_turns([&bare, &whole]);
+        print_row(&format!("bare encoders, {}", filter.name()), bare, None);
+        print_row(&format!("bake, {}", filter.name()), whole, Some(bare));
     }
 
     println!("\nwhat a bake does beside filtering and compressing");
-    row("reading PNG", None, || {
+    let textures = bake(&load(folder.path()), Filter::Linear, &sheets);
+    let read = || {
         for file in ["weave_normal.png", "weave_aniso.png"] {
             std::hint::black_box(read_image(&folder.path().join(file)).expect("read"));
         }
-    });
-    row("reading and checking", None, || drop(load(folder.path())));
-    let textures = bake(&load(folder.path()), Filter::Linear, &sheets);
-    row("Zstandard", None, || {
+    };
+    let check = || drop(load(folder.path()));
+    let supercompress = || {
         textures.par_iter().for_each(|texture| {
             std::hint::black_box(encode_ktx2(texture, Some(ZSTD)).expect("a container"));
         });
-    });
-    row("Zstandard and writing", None, || write(folder.path(), &textures));
+    };
+    let write = || write(folder.path(), &textures);
+    let times = in_turns([&read, &check, &supercompress, &write]);
+    let names = ["reading PNG", "reading and checking", "Zstandard", "Zstandard and writing"];
+    for (name, times) in names.into_iter().zip(times) {
+        print_row(name, times, None);
+    }
 }
 
-/// Prints a row of the table and returns the times on one thread and two.
-fn row(name: &str, bare: Option<[f64; 2]>, run: impl Fn() + Sync) -> [f64; 2] {
-    let times = [1, 2].map(|threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| fastest(&run))
-    });
+/// Times of each job on one thread and on two, the jobs run in turns.
+fn in_turns<const N: usize>(jobs: [&(dyn Fn() + Sync); N]) -> [[f64; 2]; N] {
+    let pools =
+        [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads"));
+    let mut fastest = [[f64::INFINITY; 2]; N];
+    for _ in 0..RUNS {
+        for (i, pool) in pools.iter().enumerate() {
+            for (job, fastest) in jobs.iter().zip(&mut fastest) {
+                let start = Instant::now();
+                pool.install(job);
+                fastest[i] = fastest[i].min(start.elapsed().as_secs_f64());
+            }
+        }
+    }
+    fastest
+}
+
+fn print_row(name: &str, times: [f64; 2], bare: Option<[f64; 2]>) {
     let beside = bare
         .map_or_else(String::new, |bare| format!(" {:9.2} {:9.2}", times[0] / bare[0], times[1] / bare[1]));
     println!("{name:24} {:9.3} {:9.3} {:7.2}{beside}", times[0], times[1], times[0] / times[1]);
-    times
-}
-
-fn fastest(run: &impl Fn()) -> f64 {
-    let mut best = f64::INFINITY;
-    for _ in 0..3 {
-        let start = Instant::now();
-        run();
-        best = best.min(start.elapsed().as_secs_f64());
-    }
-    best
 }
 
 fn sheets() -> [SheetRequest<'static>; 2] {

@@ -93,10 +93,10 @@ const RUN: usize = 64;
 /// The plane of ones, after the four of an image.
 const OPAQUE: usize = 4;
 
-/// Takes interleaved samples of `stored` channels apart and hands out the planes asked for. Converting samples
-/// and picking them are loops of their own, of known lengths: only so does the compiler find shuffles for both.
+/// Takes interleaved samples of `stored` channels apart and hands out the planes asked for. Picking samples and
+/// converting them are loops of their own, of known lengths: only so does the compiler find shuffles for both.
 #[inline(always)]
-fn deinterleave<T: Copy, const K: usize>(
+fn deinterleave<T: Copy + Default, const K: usize>(
     data: &[T],
     stored: usize,
     planes: [usize; K],
@@ -112,28 +112,35 @@ fn deinterleave<T: Copy, const K: usize>(
 }
 
 #[inline(always)]
-fn deinterleave_by<T: Copy, const N: usize, const K: usize>(
+fn deinterleave_by<T: Copy + Default, const N: usize, const K: usize>(
     data: &[T],
     planes: [usize; K],
     convert: impl Fn(T) -> f32,
     mut out: [&mut [f32]; K],
 ) {
-    let mut samples = [[0.0; N]; RUN];
-    let mut apart = [[1.0; RUN]; OPAQUE + 1];
-    for (run, data) in data.chunks(RUN * N).enumerate() {
-        for (o, v) in samples.as_flattened_mut().iter_mut().zip(data) {
-            *o = convert(*v);
-        }
+    let mut padded = [[T::default(); N]; RUN];
+    let mut apart = [[T::default(); RUN]; N];
+    let mut converted = [[1.0; RUN]; OPAQUE + 1];
+    for (run, data) in data.as_chunks::<N>().0.chunks(RUN).enumerate() {
+        let data: &[[T; N]; RUN] = data.try_into().unwrap_or_else(|_| {
+            padded[..data.len()].copy_from_slice(data);
+            &padded
+        });
         for i in 0..RUN {
             for channel in 0..N {
-                apart[channel][i] = samples[i][channel];
+                apart[channel][i] = data[i][channel];
+            }
+        }
+        for (converted, apart) in converted.iter_mut().zip(&apart) {
+            for (o, v) in converted.iter_mut().zip(apart) {
+                *o = convert(*v);
             }
         }
         for (out, plane) in out.iter_mut().zip(planes) {
             let out = &mut out[run * RUN..];
             match out.first_chunk_mut() {
-                Some(out) => *out = apart[plane],
-                None => out.copy_from_slice(&apart[plane][..out.len()]),
+                Some(out) => *out = converted[plane],
+                None => out.copy_from_slice(&converted[plane][..out.len()]),
             }
         }
     }

@@ -274,8 +274,9 @@ fn odd_footprints_are_probed_beyond_their_end() {
 fn rough_surfaces_are_flattened() {
     use glam::vec3;
     use kinran_shading::Sym2;
-    for alpha in [0.5, 0.8, 0.9, 0.95, 0.99, 1.0] {
-        let mut random = Random::new(5);
+    let alphas = [0.5, 0.8, 0.9, 0.95, 0.99, 1.0];
+    for (alpha, seed) in alphas.into_iter().flat_map(|alpha| (5..11).map(move |seed| (alpha, seed))) {
+        let mut random = Random::new(seed);
         let texels: Vec<common::Surface> = (0..16 * 16)
             .map(|_| {
                 let n = vec3(0.4 + 0.1 * random.gauss(), 0.1 * random.gauss(), 1.0).normalize();
@@ -285,12 +286,10 @@ fn rough_surfaces_are_flattened() {
         for filter in Filter::ALL {
             let (n, _) = common::filtered(&texels, 16, filter);
             let tilt = n.x / n.z / 0.4;
-            println!("alpha {alpha}, {}: {tilt:.2} of the tilt", filter.name());
-            // At alpha = 1 the fitted lobe has no direction to speak of.
-            let kept = if filter == Filter::Ml && alpha == 1.0 { 0.79 } else { 0.9 };
+            println!("alpha {alpha}, seed {seed}, {}: {tilt:.2} of the tilt", filter.name());
             assert!(
-                tilt > kept && tilt < 1.3,
-                "alpha {alpha}, {}: normal {n} keeps {tilt} of the tilt, wanted {kept} to 1.3",
+                tilt > 0.9 && tilt < 1.3,
+                "alpha {alpha}, seed {seed}, {}: normal {n} keeps {tilt} of the tilt, wanted 0.9 to 1.3",
                 filter.name()
             );
         }

@@ -192,7 +192,7 @@ fn report(name: &str, texels: &[Surface], size: usize, bounds: impl Fn(usize) ->
 /// and a quarter, further ones 1024 a footprint.
 fn without_period(level: usize) -> (f64, f64, f64) {
     match level {
-        1 | 2 => (0.005, 0.02, 0.4),
+        1 | 2 => (0.002, 0.01, 0.15),
         3 | 4 => (0.02, 0.11, 1.2),
         _ => (0.06, 0.13, 3.5),
     }

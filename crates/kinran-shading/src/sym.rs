@@ -89,13 +89,12 @@ impl Sym2 {
 
     /// The positive semi-definite square root of a positive semi-definite matrix:
     /// `(A + sqrt(det) I) / sqrt(trace + 2 sqrt(det))`, by Cayley–Hamilton.
+    #[inline(always)]
     pub fn sqrt(self) -> Self {
         let root_det = sqrt(self.det().max(0.0));
         let scale = sqrt(self.trace() + 2.0 * root_det);
-        if scale == 0.0 {
-            return Sym2::default();
-        }
-        (self + Sym2::scalar(root_det)) * scale.recip()
+        let inv = if scale == 0.0 { 0.0 } else { scale.recip() };
+        (self + Sym2::scalar(root_det)) * inv
     }
 }
 

@@ -1,28 +1,28 @@
-//! Sixteen floats that move together: one output texel a lane.
+//! Eight floats that move together: one output texel a lane.
 
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 use glam::{Vec3, vec3};
 
-/// Lanes of an [`F16`].
-pub(crate) const LANES: usize = 16;
+/// Lanes of an [`F8`].
+pub(crate) const LANES: usize = 8;
 
-/// Sixteen floats; every operation is IEEE-exact per lane and never fused, so that all instruction sets give
+/// Eight floats; every operation is IEEE-exact per lane and never fused, so that all instruction sets give
 /// the same bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(align(64))]
-pub(crate) struct F16(pub(crate) [f32; LANES]);
+#[repr(align(32))]
+pub(crate) struct F8(pub(crate) [f32; LANES]);
 
-impl F16 {
+impl F8 {
     #[inline(always)]
     pub(crate) fn splat(v: f32) -> Self {
-        F16([v; LANES])
+        F8([v; LANES])
     }
 
     #[inline(always)]
     pub(crate) fn map(self, f: impl Fn(f32) -> f32) -> Self {
-        F16(from_fn(|l| f(self.0[l])))
+        F8(from_fn(|l| f(self.0[l])))
     }
 
     #[inline(always)]
@@ -33,7 +33,7 @@ impl F16 {
     /// The smaller in each lane.
     #[inline(always)]
     pub(crate) fn min_of(self, o: Self) -> Self {
-        F16(from_fn(|l| if self.0[l] < o.0[l] { self.0[l] } else { o.0[l] }))
+        F8(from_fn(|l| if self.0[l] < o.0[l] { self.0[l] } else { o.0[l] }))
     }
 
     #[inline(always)]
@@ -54,55 +54,61 @@ impl F16 {
     /// `yes` in lanes that are below zero, `no` in the others.
     #[inline(always)]
     pub(crate) fn where_negative(self, yes: Self, no: Self) -> Self {
-        F16(from_fn(|l| if self.0[l] < 0.0 { yes.0[l] } else { no.0[l] }))
+        F8(from_fn(|l| if self.0[l] < 0.0 { yes.0[l] } else { no.0[l] }))
     }
 }
 
 macro_rules! lane_wise {
     ($($op:ident $method:ident),*) => {$(
-        impl $op for F16 {
-            type Output = F16;
+        impl $op for F8 {
+            type Output = F8;
             #[inline(always)]
-            fn $method(self, o: F16) -> F16 {
-                F16(from_fn(|l| self.0[l].$method(o.0[l])))
+            fn $method(self, o: F8) -> F8 {
+                F8(from_fn(|l| self.0[l].$method(o.0[l])))
             }
         }
     )*};
 }
 lane_wise!(Add add, Sub sub, Mul mul, Div div);
 
-impl AddAssign for F16 {
+impl AddAssign for F8 {
     #[inline(always)]
-    fn add_assign(&mut self, o: F16) {
+    fn add_assign(&mut self, o: F8) {
         *self = *self + o;
     }
 }
 
-impl Neg for F16 {
-    type Output = F16;
+impl Neg for F8 {
+    type Output = F8;
     #[inline(always)]
-    fn neg(self) -> F16 {
+    fn neg(self) -> F8 {
         self.map(|v| -v)
     }
 }
 
-/// Sixteen vectors.
+/// Eight vectors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct V16 {
-    pub(crate) x: F16,
-    pub(crate) y: F16,
-    pub(crate) z: F16,
+pub(crate) struct V8 {
+    pub(crate) x: F8,
+    pub(crate) y: F8,
+    pub(crate) z: F8,
 }
 
-impl V16 {
+impl V8 {
     #[inline(always)]
-    pub(crate) fn dot(self, o: V16) -> F16 {
+    pub(crate) fn dot(self, o: V8) -> F8 {
         self.x * o.x + self.y * o.y + self.z * o.z
     }
 
     #[inline(always)]
-    pub(crate) fn cross(self, o: V16) -> V16 {
-        V16 { x: self.y * o.z - o.y * self.z, y: self.z * o.x - o.z * self.x, z: self.x * o.y - o.x * self.y }
+    pub(crate) fn cross(self, o: V8) -> V8 {
+        V8 { x: self.y * o.z - o.y * self.z, y: self.z * o.x - o.z * self.x, z: self.x * o.y - o.x * self.y }
+    }
+
+    /// Its components along the columns of a frame.
+    #[inline(always)]
+    pub(crate) fn in_frame(self, [x, y, z]: &[V8; 3]) -> V8 {
+        V8 { x: self.dot(*x), y: self.dot(*y), z: self.dot(*z) }
     }
 
     #[inline(always)]
@@ -111,26 +117,26 @@ impl V16 {
     }
 }
 
-impl Add for V16 {
-    type Output = V16;
+impl Add for V8 {
+    type Output = V8;
     #[inline(always)]
-    fn add(self, o: V16) -> V16 {
-        V16 { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
+    fn add(self, o: V8) -> V8 {
+        V8 { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
     }
 }
 
-impl Sub for V16 {
-    type Output = V16;
+impl Sub for V8 {
+    type Output = V8;
     #[inline(always)]
-    fn sub(self, o: V16) -> V16 {
-        V16 { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
+    fn sub(self, o: V8) -> V8 {
+        V8 { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
     }
 }
 
-impl Mul<F16> for V16 {
-    type Output = V16;
+impl Mul<F8> for V8 {
+    type Output = V8;
     #[inline(always)]
-    fn mul(self, s: F16) -> V16 {
-        V16 { x: self.x * s, y: self.y * s, z: self.z * s }
+    fn mul(self, s: F8) -> V8 {
+        V8 { x: self.x * s, y: self.y * s, z: self.z * s }
     }
 }

@@ -92,8 +92,8 @@ pub fn coarser_levels<T: Send>(
         Filter::Linear => moment_levels::<LinearFilter, T>(maps, kernel, &consume),
         Filter::Lean => moment_levels::<LeanFilter, T>(maps, kernel, &consume),
         Filter::Naive => moment_levels::<NaiveFilter, T>(maps, kernel, &consume),
-        Filter::Ml => footprint_levels(maps, kernel, ml::fit_row, &consume),
-        Filter::Param => footprint_levels(maps, kernel, param::fit_row, &consume),
+        Filter::Ml => footprint_levels(maps, kernel, ml::fit_band, &consume),
+        Filter::Param => footprint_levels(maps, kernel, param::fit_band, &consume),
     }
 }
 
@@ -179,7 +179,8 @@ impl<F: MomentFilter> pulp::WithSimd for ExtractBand<'_, F> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let width = self.planes.width;
-        let mut padded = [[0.0; TILE]; MOMENTS];
+        // Behind the end of a row stand averages that every filter has a quick answer to.
+        let mut padded = [[1.0; TILE]; MOMENTS];
         let mut tile = [[0.0; TILE]; 6];
         for row in self.planes.samples.chunks_exact(width * MOMENTS) {
             for x0 in (0..width).step_by(TILE) {
@@ -228,7 +229,7 @@ fn add_moments<F: MomentFilter>(
 fn footprint_levels<T: Send>(
     maps: &SurfaceMaps,
     kernel: Kernel,
-    fit_row: impl Fn(&SurfaceMaps, &[Taps], &Taps, &mut TexelSpan) + Sync,
+    fit_band: impl Fn(&SurfaceMaps, &[Taps], &[Taps], &mut TexelSpan) + Sync,
     consume: &(impl Fn(&Band) -> T + Sync),
 ) -> Vec<Vec<T>> {
     let size = maps.size();
@@ -238,12 +239,9 @@ fn footprint_levels<T: Send>(
     (1..levels)
         .map(|level| {
             let (columns, rows) = (&columns[level - 1], &rows[level - 1]);
-            in_bands(size, level, |band, row| {
-                for y in band.y0..band.y0 + band.rows {
-                    row.resize(columns.len());
-                    fit_row(maps, columns, &rows[y as usize], row);
-                    band.texels.append(row);
-                }
+            in_bands(size, level, |band, _| {
+                let rows = &rows[band.y0 as usize..][..band.rows as usize];
+                fit_band(maps, columns, rows, &mut band.texels);
                 consume(band)
             })
         })

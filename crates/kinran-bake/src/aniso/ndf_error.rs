@@ -6,7 +6,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use kinran_shading::{Sym2, UNIT_SLOPES, microfacet_basis, sggx_d, sggx_from_ggx};
 
-use super::lanes::{F16, LANES, V16};
+use super::lanes::{F8, LANES, V8};
 
 /// Relative L2 error of one GGX lobe against the mean of others:
 /// `sqrt(∫ (D' - D)² h·z dω / ∫ D² h·z dω)`, where D is the mean of the texels' distributions.
@@ -25,13 +25,13 @@ struct NdfError<'a> {
     fit: (Vec3, Sym2),
 }
 
-/// Sixteen lobes: [`sggx_d`] of each, times a weight.
+/// Eight lobes: [`sggx_d`] of each, times a weight.
 #[derive(Clone, Copy, Default)]
 struct Lobes {
-    n: V16,
+    n: V8,
     /// The adjugate of the SGGX matrix, `[xx, xy, xz, yy, yz, zz]`.
-    adjugate: [F16; 6],
-    scale: F16,
+    adjugate: [F8; 6],
+    scale: F8,
 }
 
 impl Lobes {
@@ -47,15 +47,15 @@ impl Lobes {
 
     /// The weighted distributions at `h`, of the lobes that see it; lanes without a lobe are zero.
     #[inline(always)]
-    fn d(&self, h: Vec3) -> F16 {
-        let [x, y, z] = h.to_array().map(F16::splat);
+    fn d(&self, h: Vec3) -> F8 {
+        let [x, y, z] = h.to_array().map(F8::splat);
         let [xx, xy, xz, yy, yz, zz] = self.adjugate;
         let cross = xy * (x * y) + xz * (x * z) + yz * (y * z);
         let q = xx * (x * x) + yy * (y * y) + zz * (z * z) + cross + cross;
-        let facing = self.n.dot(V16 { x, y, z });
+        let facing = self.n.dot(V8 { x, y, z });
         let d = self.scale / (q * q);
         // Lanes without a lobe face nothing; their 0 / 0 goes here.
-        F16(from_fn(|l| if facing.0[l] > 0.0 { d.0[l] } else { 0.0 }))
+        F8(from_fn(|l| if facing.0[l] > 0.0 { d.0[l] } else { 0.0 }))
     }
 }
 
@@ -80,7 +80,7 @@ impl pulp::WithSimd for NdfError<'_> {
             if h.z <= 0.0 {
                 return;
             }
-            let mut means = F16::default();
+            let mut means = F8::default();
             for lobes in &lobes {
                 means += lobes.d(h);
             }

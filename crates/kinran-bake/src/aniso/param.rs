@@ -15,8 +15,16 @@ use kinran_shading::{
 use super::footprint::Taps;
 use super::maps::{SurfaceMaps, TexelSpan};
 
-/// Fits one row of a level: `columns` are the footprints of its texels along x, `rows` the one along y.
-pub(crate) fn fit_row(maps: &SurfaceMaps, columns: &[Taps], rows: &Taps, out: &mut TexelSpan) {
+/// Fits some rows of a level: `columns` are the footprints of their texels along x, `rows` those along y.
+pub(crate) fn fit_band(maps: &SurfaceMaps, columns: &[Taps], rows: &[Taps], out: &mut TexelSpan) {
+    out.resize(columns.len() * rows.len());
+    for (y, rows) in rows.iter().enumerate() {
+        fit_row(maps, columns, rows, y * columns.len(), out);
+    }
+}
+
+/// Fits one row and puts it at `at` and behind it.
+fn fit_row(maps: &SurfaceMaps, columns: &[Taps], rows: &Taps, at: usize, out: &mut TexelSpan) {
     let mut sums = vec![Sums::default(); columns.len()];
     for_each_texel(maps, columns, rows, |x, n, a, weight| {
         let sum = &mut sums[x];
@@ -44,7 +52,7 @@ pub(crate) fn fit_row(maps: &SurfaceMaps, columns: &[Taps], rows: &Taps, out: &m
                 ggx_from_sggx(diagonal.in_frame(axes[x].transpose()), sum.mean.normalize_or(Vec3::Z))
             }
         };
-        out.set(x, n, a);
+        out.set(at + x, n, a);
     }
 }
 

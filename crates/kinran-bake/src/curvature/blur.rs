@@ -15,7 +15,7 @@
 
 use super::faces::{Corners, frame_tangents, turn};
 use super::surface::{Fans, Welded};
-use crate::aniso::lanes::{F16, LANES, V16};
+use crate::aniso::lanes::{F8, LANES, V8};
 use glam::{Vec3, Vec4, Vec4Swizzles, vec4};
 use kinran_shading::Sym2;
 use rayon::prelude::*;
@@ -293,7 +293,7 @@ impl pulp::WithSimd for Transport<'_> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         for (owners, links) in self.owners.chunks(LANES).zip(self.links.chunks_mut(LANES)) {
-            let (mut here, mut there) = (V16::default(), V16::default());
+            let (mut here, mut there) = (V8::default(), V8::default());
             for (l, (&owner, link)) in owners.iter().zip(&*links).enumerate() {
                 let (n, o) = (self.normals[owner as usize], self.normals[link.point() as usize]);
                 (here.x.0[l], here.y.0[l], here.z.0[l]) = (n.x, n.y, n.z);
@@ -303,7 +303,7 @@ impl pulp::WithSimd for Transport<'_> {
             let (cos, sin) = turn(there, frame_tangents(there), here, tangent, here.cross(tangent));
             let inverse = (cos * cos + sin * sin).recip();
             let double = [(cos * cos - sin * sin) * inverse, (cos * sin + cos * sin) * inverse];
-            let one_plus = F16::splat(1.0) + here.dot(there);
+            let one_plus = F8::splat(1.0) + here.dot(there);
             let lengths = here.dot(here).min_of(there.dot(there));
             for (l, link) in links.iter_mut().enumerate() {
                 let fits = link.0[0] > 0.0 && one_plus.0[l] >= 1e-3 && lengths.0[l] > 0.0;

@@ -7,12 +7,12 @@
 //! squares, how the normals change along the three edges; at each point the mean of the tensors around it by
 //! Voronoi area, each turned by the shortest arc from the triangle's normal to the point's.
 //!
-//! Sixteen triangles at a time, in single precision: positions are first scaled by a power of two, which is exact, so that
+//! Eight triangles at a time, in single precision: positions are first scaled by a power of two, which is exact, so that
 //! the model is about one unit large, and the differences of normals, whose own rounding is 3e-8, are what
 //! limits the result.
 
 use super::surface::Welded;
-use crate::aniso::lanes::{F16, LANES, V16};
+use crate::aniso::lanes::{F8, LANES, V8};
 use glam::Vec3;
 use kinran_shading::Sym2;
 
@@ -32,12 +32,12 @@ pub(crate) fn frame(normal: Vec3) -> (Vec3, Vec3) {
     normal.any_orthonormal_pair()
 }
 
-/// [`frame`]'s tangents of sixteen normals (Duff 2017).
+/// [`frame`]'s tangents of eight normals (Duff 2017).
 #[inline(always)]
-pub(crate) fn frame_tangents(n: V16) -> V16 {
+pub(crate) fn frame_tangents(n: V8) -> V8 {
     let sign = n.z.map(|z| 1f32.copysign(z));
     let a = -(sign + n.z).recip();
-    V16 { x: F16::splat(1.0) + sign * n.x * n.x * a, y: sign * (n.x * n.y * a), z: -(sign * n.x) }
+    V8 { x: F8::splat(1.0) + sign * n.x * n.x * a, y: sign * (n.x * n.y * a), z: -(sign * n.x) }
 }
 
 /// The least-squares tensor of each triangle, gathered at the points.
@@ -87,10 +87,10 @@ impl pulp::WithSimd for Faces<'_> {
     }
 }
 
-/// The corners of up to sixteen triangles; lanes beyond them are zero.
+/// The corners of up to eight triangles; lanes beyond them are zero.
 #[inline(always)]
-fn gather_corners(of: &[Vec3], triangles: &[[u32; 3]]) -> [V16; 3] {
-    let mut corners = [V16::default(); 3];
+fn gather_corners(of: &[Vec3], triangles: &[[u32; 3]]) -> [V8; 3] {
+    let mut corners = [V8::default(); 3];
     for (l, triangle) in triangles.iter().enumerate().take(LANES) {
         for (v, &point) in corners.iter_mut().zip(triangle) {
             let Vec3 { x, y, z } = of[point as usize];
@@ -100,14 +100,14 @@ fn gather_corners(of: &[Vec3], triangles: &[[u32; 3]]) -> [V16; 3] {
     corners
 }
 
-/// Edges of up to sixteen triangles; edge i lies opposite to corner i.
+/// Edges of up to eight triangles; edge i lies opposite to corner i.
 pub(crate) struct Corners {
-    edge: [V16; 3],
-    squared: [F16; 3],
-    cross: V16,
-    double_area: F16,
+    edge: [V8; 3],
+    squared: [F8; 3],
+    cross: V8,
+    double_area: F8,
     /// Products of the two edges that leave a corner; over the double area they are cotangents.
-    dots: [F16; 3],
+    dots: [F8; 3],
 }
 
 impl Corners {
@@ -115,7 +115,7 @@ impl Corners {
     #[inline(always)]
     pub(crate) fn gather(positions: &[Vec3], triangles: &[[u32; 3]], scale: f32) -> Self {
         let [a, b, c] = gather_corners(positions, triangles);
-        let scale = F16::splat(scale);
+        let scale = F8::splat(scale);
         let edge = [(c - b) * scale, (a - c) * scale, (b - a) * scale];
         let cross = edge[0].cross(edge[1]);
         Corners {
@@ -142,7 +142,7 @@ impl Corners {
 
     /// Half the cotangents at the corners.
     #[inline(always)]
-    pub(crate) fn half_cotangents(&self) -> [F16; 3] {
+    pub(crate) fn half_cotangents(&self) -> [F8; 3] {
         let half = (self.double_area + self.double_area).recip();
         [self.dots[0] * half, self.dots[1] * half, self.dots[2] * half]
     }
@@ -150,12 +150,12 @@ impl Corners {
     /// The part of a triangle's area that belongs to each corner (Meyer 2002, figure 4): Voronoi where no angle is
     /// obtuse, else a half at the obtuse one and a quarter at the others. Sums to the area.
     #[inline(always)]
-    pub(crate) fn areas(&self) -> [F16; 3] {
+    pub(crate) fn areas(&self) -> [F8; 3] {
         let (dots, squared) = (self.dots, self.squared);
-        let part = |share: f32| self.double_area * F16::splat(0.5 * share);
+        let part = |share: f32| self.double_area * F8::splat(0.5 * share);
         let (half, quarter) = (part(0.5), part(0.25));
-        let scale = F16::splat(0.125) / self.double_area;
-        let mut areas = [F16::default(); 3];
+        let scale = F8::splat(0.125) / self.double_area;
+        let mut areas = [F8::default(); 3];
         for (i, area) in areas.iter_mut().enumerate() {
             let (next, last) = ((i + 1) % 3, (i + 2) % 3);
             let voronoi = scale * (squared[next] * dots[next] + squared[last] * dots[last]);
@@ -169,14 +169,14 @@ impl Corners {
 /// For each corner the triangle's tensor along the tangent and bitangent of the corner's point, both turned into the
 /// triangle, times the corner's area, and that area.
 #[inline(always)]
-fn weighted_tensors(corners: &Corners, normals: &[V16; 3]) -> [[F16; 4]; 3] {
+fn weighted_tensors(corners: &Corners, normals: &[V8; 3]) -> [[F8; 4]; 3] {
     // The frame of the triangle, and edges in units of the first, along which the frame's tangent runs. The edges sum to
     // zero, so that two numbers, u and v of the second, say them all.
     let inverse = corners.squared[0].sqrt().recip();
     let n = corners.cross * corners.double_area.recip();
     let t = corners.edge[0] * inverse;
     let b = n.cross(t);
-    let one = F16::splat(1.0);
+    let one = F8::splat(1.0);
     let (u, v) = (corners.edge[1].dot(t) * inverse, corners.edge[1].dot(b) * inverse);
     let third = -(one + u);
     let change = [normals[2] - normals[1], normals[0] - normals[2], normals[1] - normals[0]];
@@ -191,14 +191,14 @@ fn weighted_tensors(corners: &Corners, normals: &[V16; 3]) -> [[F16; 4]; 3] {
     let r0 = p[0] + u * p[1] + third * p[2];
     let r1 = v * (p[1] - p[2]) + q[0] + u * q[1] + third * q[2];
     let r2 = v * (q[1] - q[2]);
-    let minor = F16::splat(3.0) * v * v;
+    let minor = F8::splat(3.0) * v * v;
     let scale = inverse / ((uu + vv) * minor);
     let xx = scale * ((minor + vv * vv) * r0 - uv * vv * r1 + uv * uv * r2);
     let xy = scale * (uu * vv * r1 - uv * vv * r0 - uu * uv * r2);
     let yy = scale * (uv * uv * r0 - uu * uv * r1 + (uu * uu + minor) * r2);
 
     let areas = corners.areas();
-    let mut weighted = [[F16::default(); 4]; 3];
+    let mut weighted = [[F8::default(); 4]; 3];
     for ((weighted, &from), w) in weighted.iter_mut().zip(normals).zip(areas) {
         let (cos, sin) = turn(from, frame_tangents(from), n, t, b);
         let (cc, ss, cs) = (cos * cos, sin * sin, cos * sin);
@@ -216,13 +216,13 @@ fn weighted_tensors(corners: &Corners, normals: &[V16; 3]) -> [[F16; 4]; 3] {
 /// Cosine and sine of the angle, in a plane of normal `n` and frame `t`, `b`, of `tangent` after the shortest arc from the
 /// normal `from` to `n`. Opposite normals have no shortest arc; any tangent then.
 #[inline(always)]
-pub(crate) fn turn(from: V16, tangent: V16, n: V16, t: V16, b: V16) -> (F16, F16) {
-    let one_plus = F16::splat(1.0) + from.dot(n);
+pub(crate) fn turn(from: V8, tangent: V8, n: V8, t: V8, b: V8) -> (F8, F8) {
+    let one_plus = F8::splat(1.0) + from.dot(n);
     let turned = tangent - (from + n) * (n.dot(tangent) / one_plus);
-    let opposite = one_plus - F16::splat(1e-6);
+    let opposite = one_plus - F8::splat(1e-6);
     (
-        opposite.where_negative(F16::splat(1.0), turned.dot(t)),
-        opposite.where_negative(F16::splat(0.0), turned.dot(b)),
+        opposite.where_negative(F8::splat(1.0), turned.dot(t)),
+        opposite.where_negative(F8::splat(0.0), turned.dot(b)),
     )
 }
 
@@ -248,7 +248,7 @@ mod tests {
     #[test]
     fn tangents_in_lanes_are_those_of_single_normals() {
         for n in [Vec3::X, -Vec3::Z, Vec3::Z, Vec3::new(0.1, -0.7, -0.3).normalize()] {
-            let mut lanes = V16::default();
+            let mut lanes = V8::default();
             (lanes.x.0[3], lanes.y.0[3], lanes.z.0[3]) = (n.x, n.y, n.z);
             let got = frame_tangents(lanes).lane(3);
             assert!((got - frame(n).0).length() < 1e-6, "{n}: wanted {}, got {got}", frame(n).0);
