@@ -427,10 +427,13 @@ fn quantise_row(planes: &[f32], transfer: Transfer, out: &mut [u8]) {
     }
 }
 
-/// The byte nearest to a value in [0, 1].
+/// The byte nearest to a value, which is brought to [0, 1] first; halves are rounded up.
+///
+/// A cast would saturate, which compilers do element by element. The sum with 2^23 has the rounded number in its lowest
+/// bits; 1e-5, about the last digit of 255, takes halves up, which would otherwise go to the even number.
 #[inline(always)]
 pub(crate) fn unorm8(v: f32) -> u8 {
-    (v * 255.0 + 0.5) as u8
+    ((v.clamp(0.0, 1.0) * 255.0 + 1e-5) + 8_388_608.0).to_bits() as u8
 }
 
 /// IEC 61966-2-1, sRGB to linear.
@@ -441,4 +444,23 @@ pub fn linear_from_srgb(v: f32) -> f32 {
 /// IEC 61966-2-1, linear to sRGB.
 pub fn srgb_from_linear(v: f32) -> f32 {
     if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * libm::powf(v, 1.0 / 2.4) - 0.055 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unorm8;
+
+    #[test]
+    fn a_value_is_not_rounded_to_the_nearest_byte() {
+        for i in 0..=255_u16 {
+            let byte = |v| u16::from(unorm8(v));
+            assert_eq!(byte(f32::from(i) / 255.0), i, "its own value");
+            let half = (f32::from(i) + 0.5) / 255.0;
+            assert_eq!(byte(half), (i + 1).min(255), "half a step above {i}");
+            assert_eq!(byte(half - 1e-6), i, "a little less than half a step above {i}");
+        }
+        for (v, wanted) in [(-1.0, 0), (-0.0, 0), (2.0, 255), (f32::INFINITY, 255), (f32::NAN, 0)] {
+            assert_eq!(unorm8(v), wanted, "{v}");
+        }
+    }
 }

@@ -276,7 +276,7 @@ impl QuantiseBand<'_> {
     fn quantise(self, encode: impl Fn(Vec3, Sym2) -> [f32; 3]) {
         let TexelSpan { nx, ny, nz, axx, axy, ayy, .. } = self.texels;
         let mut run = [[0.0; RUN]; 6];
-        let mut rgb = [[0; RUN]; 3];
+        let mut packed = [0; RUN];
         for (x0, out) in (0..).step_by(RUN).zip(self.out.chunks_mut(4 * RUN)) {
             let len = out.len() / 4;
             for (run, plane) in run.iter_mut().zip([nx, ny, nz, axx, axy, ayy]) {
@@ -285,11 +285,11 @@ impl QuantiseBand<'_> {
             let [nx, ny, nz, axx, axy, ayy] = &run;
             for i in 0..RUN {
                 let a = Sym2 { xx: axx[i], xy: axy[i], yy: ayy[i] };
-                let texel = encode(vec3(nx[i], ny[i], nz[i]), a).map(unorm8);
-                (rgb[0][i], rgb[1][i], rgb[2][i]) = (texel[0], texel[1], texel[2]);
+                let [r, g, b] = encode(vec3(nx[i], ny[i], nz[i]), a);
+                packed[i] = u32::from_le_bytes([unorm8(r), unorm8(g), unorm8(b), 255]);
             }
-            for (i, out) in out.as_chunks_mut().0.iter_mut().enumerate() {
-                *out = [rgb[0][i], rgb[1][i], rgb[2][i], 255];
+            for (out, packed) in out.as_chunks_mut().0.iter_mut().zip(&packed) {
+                *out = packed.to_le_bytes();
             }
         }
     }
