@@ -71,11 +71,8 @@ pub fn filter_levels<T: Send>(
     consume: impl Fn(&Band) -> T + Sync,
 ) -> Vec<Vec<T>> {
     let size = maps.size();
-    let finest = in_bands(size, 0, |band, span| {
-        for row in 0..band.rows {
-            maps.decode_span(size, band.y0 + row, 0, size.0 as usize, span);
-            band.texels.append(span);
-        }
+    let finest = in_bands(size, 0, |band| {
+        maps.decode_rows(size, band.y0, band.rows, &mut band.texels);
         consume(band)
     });
     std::iter::once(finest).chain(coarser_levels(maps, filter, kernel, &consume)).collect()
@@ -97,22 +94,17 @@ pub fn coarser_levels<T: Send>(
     }
 }
 
-/// Runs `make` over a level in bands, in parallel. Bands come without texels, and with room for a row; the memory
-/// of both goes from band to band, since fresh pages cost more than what is computed into them.
-fn in_bands<T: Send>(
-    size: (u32, u32),
-    level: usize,
-    make: impl Fn(&mut Band, &mut TexelSpan) -> T + Sync,
-) -> Vec<T> {
+/// Runs `make` over a level in bands, in parallel; it sets the band's texels. Their memory goes from band to band, since
+/// fresh pages cost more than what is computed into them.
+fn in_bands<T: Send>(size: (u32, u32), level: usize, make: impl Fn(&mut Band) -> T + Sync) -> Vec<T> {
     let (width, height) = (level_size(size.0, level), level_size(size.1, level));
     (0..height.div_ceil(BAND_ROWS))
         .into_par_iter()
-        .map_init(<(TexelSpan, TexelSpan)>::default, |(texels, row), i| {
+        .map_init(TexelSpan::default, |texels, i| {
             let y0 = i * BAND_ROWS;
             let rows = BAND_ROWS.min(height - y0);
-            texels.clear();
             let mut band = Band { level, width, y0, rows, texels: std::mem::take(texels) };
-            let made = make(&mut band, row);
+            let made = make(&mut band);
             *texels = band.texels;
             made
         })
@@ -239,7 +231,7 @@ fn footprint_levels<T: Send>(
     (1..levels)
         .map(|level| {
             let (columns, rows) = (&columns[level - 1], &rows[level - 1]);
-            in_bands(size, level, |band, _| {
+            in_bands(size, level, |band| {
                 let rows = &rows[band.y0 as usize..][..band.rows as usize];
                 fit_band(maps, columns, rows, &mut band.texels);
                 consume(band)

@@ -1,5 +1,6 @@
 //! Authored maps as rows of normals and squared roughness matrices.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3, vec2, vec3};
@@ -150,11 +151,6 @@ impl TexelSpan {
         [nx, ny, nz, axx, axy, ayy].into_iter().for_each(Vec::clear);
     }
 
-    /// Appends the texels of another span.
-    pub fn append(&mut self, other: &TexelSpan) {
-        self.extend([&other.nx, &other.ny, &other.nz, &other.axx, &other.axy, &other.ayy]);
-    }
-
     /// Appends texels `[nx, ny, nz, axx, axy, ayy]`.
     #[inline(always)]
     pub(crate) fn extend(&mut self, texels: [&[f32]; 6]) {
@@ -216,41 +212,52 @@ impl SurfaceMaps {
     /// than level 0 are enlarged bilinearly, in the form in which they are stored.
     pub fn decode_span(&self, size: (u32, u32), y: u32, x0: u32, len: usize, span: &mut TexelSpan) {
         span.resize(len);
-        for v in &mut span.scratch {
-            v.resize(len, 0.0);
+        self.decode_part(Place { size, y, x0, wrap: self.wrap }, 0..len, span);
+    }
+
+    /// Decodes rows `y0 .. y0 + rows` of level 0, of size `size`, into `texels`, row after row.
+    pub(crate) fn decode_rows(&self, size: (u32, u32), y0: u32, rows: u32, texels: &mut TexelSpan) {
+        let width = size.0 as usize;
+        texels.resize(rows as usize * width);
+        for row in 0..rows {
+            let start = row as usize * width;
+            let at = Place { size, y: y0 + row, x0: 0, wrap: self.wrap };
+            self.decode_part(at, start..start + width, texels);
         }
-        let at = Place { size, y, x0, wrap: self.wrap };
-        pulp::Arch::new().dispatch(DecodeSpan { maps: self, at, span });
+    }
+
+    fn decode_part(&self, at: Place, part: Range<usize>, span: &mut TexelSpan) {
+        pulp::Arch::new().dispatch(DecodeSpan { maps: self, at, part, span });
     }
 
     #[inline(always)]
-    fn decode_normals(&self, at: Place, span: &mut TexelSpan) {
+    fn decode_normals(&self, at: Place, [nx, ny, nz]: [&mut [f32]; 3]) {
         let Some(image) = &self.normal.image else {
-            span.nx.fill(0.0);
-            span.ny.fill(0.0);
-            span.nz.fill(1.0);
+            nx.fill(0.0);
+            ny.fill(0.0);
+            nz.fill(1.0);
             return;
         };
-        read_channels(image, [0, 1], at, [&mut span.nx, &mut span.ny]);
+        read_channels(image, [0, 1], at, [&mut *nx, &mut *ny]);
         let (gain, offset) = if self.normal.signed { (1.0, 0.0) } else { (2.0, -1.0) };
         let (y_gain, y_offset) = if self.normal.y_down { (-gain, -offset) } else { (gain, offset) };
         let scale = self.normal.scale;
         // Vectors longer than one are rare: the loop that looks for them spares the others a root and a division.
         let mut any = 0;
-        for ((x, y), z) in span.nx.iter_mut().zip(&mut span.ny).zip(&mut span.nz) {
+        for ((x, y), z) in nx.iter_mut().zip(&mut *ny).zip(&mut *nz) {
             (*x, *y) = (*x * gain + offset, *y * y_gain + y_offset);
             let xy_squared = *x * *x + *y * *y;
             any |= u32::from(xy_squared > 1.0);
             *z = (1.0 - xy_squared).max(0.0).sqrt();
         }
         if any != 0 {
-            for ((x, y), z) in span.nx.iter_mut().zip(&mut span.ny).zip(&mut span.nz) {
+            for ((x, y), z) in nx.iter_mut().zip(&mut *ny).zip(&mut *nz) {
                 let n = normal_from_xy(*x, *y);
                 (*x, *y, *z) = (n.x, n.y, n.z);
             }
         }
         if scale != 1.0 {
-            for ((x, y), z) in span.nx.iter_mut().zip(&mut span.ny).zip(&mut span.nz) {
+            for ((x, y), z) in nx.iter_mut().zip(&mut *ny).zip(&mut *nz) {
                 // Where a scale of zero leaves nothing of a normal on the horizon, the surface is flat.
                 let n = vec3(*x * scale, *y * scale, *z).normalize_or(Vec3::Z);
                 (*x, *y, *z) = (n.x, n.y, n.z);
@@ -259,10 +266,17 @@ impl SurfaceMaps {
     }
 
     #[inline(always)]
-    fn decode_roughness(&self, at: Place, span: &mut TexelSpan) {
+    fn decode_roughness(
+        &self,
+        at: Place,
+        [nx, ny, nz]: [&[f32]; 3],
+        [axx, axy, ayy]: [&mut [f32]; 3],
+        scratch: &mut [Vec<f32>; 3],
+    ) {
         // Slices of one length let the compiler drop the bounds checks that keep loops from being vectorised.
-        let len = span.len();
-        let TexelSpan { nx, ny, nz, axx, axy, ayy, scratch: [p, q, r] } = span;
+        let len = nx.len();
+        scratch.iter_mut().for_each(|v| v.resize(len, 0.0));
+        let [p, q, r] = scratch;
         let (nx, ny, nz) = (&nx[..len], &ny[..len], &nz[..len]);
         let (axx, axy, ayy) = (&mut axx[..len], &mut axy[..len], &mut ayy[..len]);
         let (p, q, r) = (&mut p[..len], &mut q[..len], &mut r[..len]);
@@ -356,10 +370,11 @@ pub(crate) fn clamp_roughness(axx: &mut [f32], axy: &mut [f32], ayy: &mut [f32])
     }
 }
 
-/// The decoding of a span, as a unit that is compiled once for each instruction set.
+/// The decoding of part of a span, as a unit that is compiled once for each instruction set.
 struct DecodeSpan<'a> {
     maps: &'a SurfaceMaps,
     at: Place,
+    part: Range<usize>,
     span: &'a mut TexelSpan,
 }
 
@@ -368,8 +383,12 @@ impl pulp::WithSimd for DecodeSpan<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        self.maps.decode_normals(self.at, self.span);
-        self.maps.decode_roughness(self.at, self.span);
+        let Self { maps, at, part, span } = self;
+        let TexelSpan { nx, ny, nz, axx, axy, ayy, scratch } = span;
+        let (nx, ny, nz) = (&mut nx[part.clone()], &mut ny[part.clone()], &mut nz[part.clone()]);
+        let (axx, axy, ayy) = (&mut axx[part.clone()], &mut axy[part.clone()], &mut ayy[part]);
+        maps.decode_normals(at, [&mut *nx, &mut *ny, &mut *nz]);
+        maps.decode_roughness(at, [nx, ny, nz], [axx, axy, ayy], scratch);
     }
 }
 
