@@ -120,7 +120,6 @@ fn deinterleave_by<T: Copy + Default, const N: usize, const K: usize>(
 ) {
     let mut padded = [[T::default(); N]; RUN];
     let mut apart = [[T::default(); RUN]; N];
-    let mut converted = [[1.0; RUN]; OPAQUE + 1];
     for (run, data) in data.as_chunks::<N>().0.chunks(RUN).enumerate() {
         let data: &[[T; N]; RUN] = data.try_into().unwrap_or_else(|_| {
             padded[..data.len()].copy_from_slice(data);
@@ -131,16 +130,15 @@ fn deinterleave_by<T: Copy + Default, const N: usize, const K: usize>(
                 apart[channel][i] = data[i][channel];
             }
         }
-        for (converted, apart) in converted.iter_mut().zip(&apart) {
-            for (o, v) in converted.iter_mut().zip(apart) {
-                *o = convert(*v);
-            }
-        }
         for (out, plane) in out.iter_mut().zip(planes) {
             let out = &mut out[run * RUN..];
-            match out.first_chunk_mut() {
-                Some(out) => *out = converted[plane],
-                None => out.copy_from_slice(&converted[plane][..out.len()]),
+            let Some(plane) = apart.get(plane) else {
+                out.fill(1.0);
+                continue;
+            };
+            match out.first_chunk_mut::<RUN>() {
+                Some(out) => out.iter_mut().zip(plane).for_each(|(o, v)| *o = convert(*v)),
+                None => out.iter_mut().zip(plane).for_each(|(o, v)| *o = convert(*v)),
             }
         }
     }

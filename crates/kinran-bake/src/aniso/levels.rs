@@ -120,17 +120,29 @@ struct MomentRows<'a, F> {
 
 impl<F: MomentFilter> PlaneRows for MomentRows<'_, F> {
     const PLANES: usize = MOMENTS;
-    type Scratch = TexelSpan;
+    type Scratch = [TexelSpan; 2];
 
     #[inline(always)]
-    fn sum_rows(&self, rows: &Taps, x0: usize, len: usize, span: &mut TexelSpan, sums: &mut [[f32; TILE]]) {
-        for (k, &(y, weight)) in rows.iter().enumerate() {
-            self.maps.decode_span(self.size, y, x0 as u32, len, span);
-            if k == 0 {
-                add_moments::<F>(span, weight, sums, |_, m| m);
-            } else {
-                add_moments::<F>(span, weight, sums, |sum, m| sum + m);
-            }
+    fn sum_rows(
+        &self,
+        rows: &Taps,
+        x0: usize,
+        len: usize,
+        [upper, lower]: &mut [TexelSpan; 2],
+        sums: &mut [[f32; TILE]],
+    ) {
+        let decode = |y, span: &mut TexelSpan| self.maps.decode_span(self.size, y, x0 as u32, len, span);
+        // Two rows, all there are where a size is even, are summed before anything is stored.
+        if let [(y0, weight0), (y1, weight1)] = rows[..] {
+            decode(y0, upper);
+            decode(y1, lower);
+            set_moments::<F>([(upper, weight0), (lower, weight1)], sums);
+            return;
+        }
+        sums.fill([0.0; TILE]);
+        for &(y, weight) in rows {
+            decode(y, upper);
+            add_moments::<F>(upper, weight, sums);
         }
     }
 }
@@ -196,25 +208,44 @@ impl<F: MomentFilter> pulp::WithSimd for ExtractBand<'_, F> {
     }
 }
 
-/// Adds the weighted moments of a decoded span to the sums of its columns, as `add` says.
+/// Sets the sums of columns to the moments of two decoded spans, each times its weight.
 #[inline(always)]
-fn add_moments<F: MomentFilter>(
-    span: &TexelSpan,
-    weight: f32,
-    sums: &mut [[f32; TILE]],
-    add: impl Fn(f32, f32) -> f32,
-) {
+fn set_moments<F: MomentFilter>(rows: [(&TexelSpan, f32); 2], sums: &mut [[f32; TILE]]) {
     let Ok(sums): Result<&mut [[f32; TILE]; MOMENTS], _> = sums.try_into() else { return };
-    let len = span.len().min(TILE);
-    let (nx, ny, nz) = (&span.nx[..len], &span.ny[..len], &span.nz[..len]);
-    let (axx, axy, ayy) = (&span.axx[..len], &span.axy[..len], &span.ayy[..len]);
+    let [(upper, upper_weight), (lower, lower_weight)] = rows;
+    let len = upper.len().min(TILE);
+    let (upper, lower) = (planes(upper, len), planes(lower, len));
     for i in 0..len {
-        let a = Sym2 { xx: axx[i], xy: axy[i], yy: ayy[i] };
-        let m = F::moments(vec3(nx[i], ny[i], nz[i]), a);
-        for (sums, m) in sums.iter_mut().zip(m) {
-            sums[i] = add(sums[i], m * weight);
+        let (m0, m1) = (moments::<F>(&upper, i), moments::<F>(&lower, i));
+        for ((sums, m0), m1) in sums.iter_mut().zip(m0).zip(m1) {
+            sums[i] = m0 * upper_weight + m1 * lower_weight;
         }
     }
+}
+
+/// Adds the moments of a decoded span, times its weight, to the sums of their columns.
+#[inline(always)]
+fn add_moments<F: MomentFilter>(span: &TexelSpan, weight: f32, sums: &mut [[f32; TILE]]) {
+    let Ok(sums): Result<&mut [[f32; TILE]; MOMENTS], _> = sums.try_into() else { return };
+    let len = span.len().min(TILE);
+    let span = planes(span, len);
+    for i in 0..len {
+        for (sums, m) in sums.iter_mut().zip(moments::<F>(&span, i)) {
+            sums[i] += m * weight;
+        }
+    }
+}
+
+/// Slices of one length, with which loops are vectorised.
+#[inline(always)]
+fn planes(span: &TexelSpan, len: usize) -> [&[f32]; 6] {
+    let TexelSpan { nx, ny, nz, axx, axy, ayy, .. } = span;
+    [&nx[..len], &ny[..len], &nz[..len], &axx[..len], &axy[..len], &ayy[..len]]
+}
+
+#[inline(always)]
+fn moments<F: MomentFilter>([nx, ny, nz, axx, axy, ayy]: &[&[f32]; 6], i: usize) -> [f32; MOMENTS] {
+    F::moments(vec3(nx[i], ny[i], nz[i]), Sym2 { xx: axx[i], xy: axy[i], yy: ayy[i] })
 }
 
 /// Levels fitted footprint by footprint from level 0.
