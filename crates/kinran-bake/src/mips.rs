@@ -257,6 +257,13 @@ impl<R: PlaneRows> pulp::WithSimd for ReduceBand<'_, R> {
 /// Sets `sums` to the weighted sum of the runs of samples that begin at `start` of each row.
 #[inline(always)]
 fn sum_samples(samples: &[f32], rows: &Taps, sums: &mut [f32], start: impl Fn(u32) -> usize) {
+    if let [(row0, weight0), (row1, weight1)] = rows[..] {
+        let pairs = samples[start(row0)..].iter().zip(&samples[start(row1)..]);
+        for (sum, (v0, v1)) in sums.iter_mut().zip(pairs) {
+            *sum = v0 * weight0 + v1 * weight1;
+        }
+        return;
+    }
     sums.fill(0.0);
     for &(row, weight) in rows {
         for (sum, v) in sums.iter_mut().zip(&samples[start(row)..]) {

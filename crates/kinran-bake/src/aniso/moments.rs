@@ -5,7 +5,7 @@
 
 use glam::{Vec3, vec2, vec3};
 use kinran_shading::{
-    LeanMoments, Sym2, Sym3, aniso_decode_matrix, aniso_encode, m_n, sggx_from_slopes, sggx_principal_axis,
+    LeanMoments, Sym2, Sym3, aniso_decode_matrix, aniso_encode, sggx_from_slopes, sggx_principal_axis,
     slopes_from_sggx,
 };
 
@@ -98,18 +98,27 @@ fn nearby_axis(s: Sym3, mean: Vec3) -> (Vec3, bool) {
     (n * 1.0_f32.copysign(overlap), is_sure)
 }
 
-/// Second half: squared roughness `[xx, xy, yy]` of matrices with known normals `n`; eigenvalues may exceed one.
+/// Second half: squared roughness `[xx, xy, yy]` of matrices with known normals `n`, z ≥ 0; eigenvalues may exceed one.
 #[inline(always)]
 pub(crate) fn sggx_roughness<const N: usize>(
     [xx, xy, xz, yy, yz, zz]: [&[f32; N]; 6],
     [nx, ny, nz]: [&[f32; N]; 3],
     [axx, axy, ayy]: [&mut [f32; N]; 3],
 ) {
+    // M_n^T S M_n with M_n as in `sggx_of_texel`: with S = [B b; b^T c] it is B - p r^T - r p^T + e p p^T.
     for i in 0..N {
-        let s = Sym3 { xx: xx[i], xy: xy[i], xz: xz[i], yy: yy[i], yz: yz[i], zz: zz[i] };
-        let s = s.in_frame(m_n(vec3(nx[i], ny[i], nz[i])));
-        let inv = s.zz.max(f32::MIN_POSITIVE).recip();
-        (axx[i], axy[i], ayy[i]) = (s.xx * inv, s.xy * inv, s.yy * inv);
+        let (px, py, z) = (nx[i], ny[i], nz[i]);
+        let k = (1.0 + z).recip();
+        let (qx, qy) = (xx[i] * px + xy[i] * py, xy[i] * px + yy[i] * py);
+        let (g, p_b) = (px * qx + py * qy, px * xz[i] + py * yz[i]);
+        let (rx, ry) = (k * qx + xz[i], k * qy + yz[i]);
+        let e = k * (k * g + (p_b + p_b)) + zz[i];
+        let (ex, ey) = (e * px - rx, e * py - ry);
+        let area = g + z * ((p_b + p_b) + z * zz[i]);
+        let inv = area.max(f32::MIN_POSITIVE).recip();
+        axx[i] = (xx[i] + px * (ex - rx)) * inv;
+        axy[i] = (xy[i] + (px * ey - py * rx)) * inv;
+        ayy[i] = (yy[i] + py * (ey - ry)) * inv;
     }
 }
 
@@ -227,7 +236,7 @@ mod tests {
         (*state >> 8) as f32 / 16_777_216.0
     }
 
-    /// Up to the horizon, and upright.
+    /// Up to the horizon, and upright, there and back.
     #[test]
     fn the_short_form_of_a_texel_is_another_matrix() {
         let mut state = 3;
@@ -244,6 +253,13 @@ mod tests {
                     .into_iter()
                     .fold(0.0_f32, |largest, v| largest.max(v.abs()));
             assert!(largest < 5e-7, "{n} {a:?}: wanted {wanted:?}, got {got:?}");
+
+            // And back.
+            let [mut xx, mut xy, mut yy] = [[0.0]; 3];
+            let matrix = [&[got.xx], &[got.xy], &[got.xz], &[got.yy], &[got.yz], &[got.zz]];
+            sggx_roughness(matrix, [&[n.x], &[n.y], &[n.z]], [&mut xx, &mut xy, &mut yy]);
+            let off = (xx[0] - a.xx).abs().max((xy[0] - a.xy).abs()).max((yy[0] - a.yy).abs());
+            assert!(off < 1e-6, "{n}: wanted {a:?}, got {xx:?}, {xy:?}, {yy:?}");
         }
     }
 
