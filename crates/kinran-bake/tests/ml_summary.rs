@@ -272,6 +272,16 @@ fn the_lobe_of_known_footprints_is_further_off_than_it_was() {
     }
 }
 
+/// On the horizon two roughnesses along the tilt differ in nothing but the z of their microfacets.
+#[test]
+fn texels_on_the_horizon_are_taken_for_one() {
+    let texel = |alpha: f32| (Vec3::X, Sym2 { xx: alpha * alpha, xy: 0.0, yy: 0.04 });
+    let texels: Vec<Surface> = (0..16).map(|i| texel(if i % 2 == 0 { 0.2 } else { 0.4 })).collect();
+    let (_, a) = filtered(&texels, 4, Filter::Ml);
+    let alpha = a.xx.sqrt();
+    assert!(alpha > 0.22 && alpha < 0.38, "wanted an alpha between 0.2 and 0.4, got {alpha}");
+}
+
 /// Whatever the texel, a footprint of nothing else comes out as it went in.
 #[test]
 fn constant_footprints_come_out_rounded() {

@@ -39,7 +39,7 @@ use super::moments::{sggx_normals, sggx_roughness};
 /// and 2 within 0.5 % and 0.1°, levels 3 and 4 within 8 % and 0.9°, further levels within 10 % and 3°.
 pub const MAX_AXIS_TEXELS: usize = 32;
 
-/// Most steps of the iteration; footprints of textures take three or four.
+/// Most steps of the iteration; footprints of textures take two to four.
 const MAX_STEPS: usize = 6;
 
 /// By how much steps are lengthened, in turn. Steps of length one shrink the error by 1/3, and the area of A at
@@ -449,8 +449,10 @@ fn linear_sums(samples: &[Sample]) -> Linear {
             let differ = |v: &F8, first: &F8| v.0[l].to_bits() ^ first.0[l].to_bits();
             *varies |= differ(&p.x, &first_p.x)
                 | differ(&p.y, &first_p.y)
+                | differ(&p.z, &first_p.z)
                 | differ(&q.x, &first_q.x)
                 | differ(&q.y, &first_q.y)
+                | differ(&q.z, &first_q.z)
                 | differ(&n.x, &first_n.x)
                 | differ(&n.y, &first_n.y);
         }

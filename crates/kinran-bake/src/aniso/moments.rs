@@ -77,20 +77,24 @@ pub(crate) fn sggx_normals<const N: usize>(
 fn nearby_axis(s: Sym3, mean: Vec3) -> (Vec3, bool) {
     /// Squared sine between both steps, above which the second one may be off by more than the cube of 3e-3.
     const MOVED: f32 = 1e-5;
-    /// Product of the distances to the other eigenvalues, as a share of the squared trace, below which rounding moves
-    /// the axis by more than 3e-5. The talk's surfaces get there at alpha 0.995.
-    const COINCIDENT: f32 = 1e-5;
+    /// Product of the distances to the other eigenvalues, as a share of their squared sum, below which two eigenvalues
+    /// are one to [`sggx_principal_axis`].
+    const COINCIDENT: f32 = 1e-3;
+    /// The same as a share of the squared trace, below which rounding moves the axis of a round lobe by more than 3e-5:
+    /// from alpha 0.995 on.
+    const ROUND: f32 = 1e-5;
 
     let step = |n: Vec3| {
         let mu = n.dot(s.mul_vec3(n)) / n.length_squared();
-        Sym3 { xx: s.xx - mu, yy: s.yy - mu, zz: s.zz - mu, ..s }.adjugate().mul_vec3(n)
+        (Sym3 { xx: s.xx - mu, yy: s.yy - mu, zz: s.zz - mu, ..s }.adjugate().mul_vec3(n), mu)
     };
-    let first = step(s.mul_vec3(mean));
-    let second = step(first);
+    let (first, _) = step(s.mul_vec3(mean));
+    let (second, mu) = step(first);
     let (length_1, length_2) = (first.length_squared(), second.length_squared());
     let n = second * length_2.sqrt().recip();
     let (overlap, agreement) = (n.dot(mean), n.dot(first));
-    let least = COINCIDENT * s.trace() * s.trace();
+    let (trace, distances) = (s.trace(), 3.0 * mu - s.trace());
+    let least = (COINCIDENT * distances * distances).max(ROUND * trace * trace);
     // More than half of the mean normal's square: no other axis can have as much.
     let is_sure = (overlap * overlap > 0.5 * mean.length_squared())
         & (agreement * agreement > (1.0 - MOVED) * length_1)
@@ -261,6 +265,19 @@ mod tests {
             let off = (xx[0] - a.xx).abs().max((xy[0] - a.xy).abs()).max((yy[0] - a.yy).abs());
             assert!(off < 1e-6, "{n}: wanted {a:?}, got {xx:?}, {xy:?}, {yy:?}");
         }
+    }
+
+    /// Two eigenvalues that are one: the plane they share holds the mean normal, which is the answer.
+    #[test]
+    fn coincident_eigenvalues_are_told_apart() {
+        let mean = vec3(0.3, 0.0, 1.0).normalize();
+        for xx in [1.0, 1.0 - 1e-6, 1.0 - 1e-4, 1.0 + 3e-4] {
+            let s = Sym3 { xx, yy: 0.01, zz: 1.0, ..Sym3::default() };
+            let (n, is_sure) = nearby_axis(s, mean);
+            assert!(!is_sure, "xx {xx}: wanted no answer, got {n}");
+        }
+        let (n, is_sure) = nearby_axis(Sym3 { xx: 0.2, yy: 0.01, zz: 1.0, ..Sym3::default() }, mean);
+        assert!(is_sure && n.distance(Vec3::Z) < 1e-5, "wanted z, got {n}, {is_sure}");
     }
 
     /// Footprints of four texels of any roughness and tilt, V grooves among them: wherever the short way is taken, it
