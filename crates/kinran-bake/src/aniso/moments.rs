@@ -102,7 +102,8 @@ fn nearby_axis(s: Sym3, mean: Vec3) -> (Vec3, bool) {
     (n * 1.0_f32.copysign(overlap), is_sure)
 }
 
-/// Second half: squared roughness `[xx, xy, yy]` of matrices with known normals `n`, z ≥ 0; eigenvalues may exceed one.
+/// Second half: squared roughness `[xx, xy, yy]` of matrices with known normals `n`, z ≥ 0; eigenvalues may exceed
+/// one.
 #[inline(always)]
 pub(crate) fn sggx_roughness<const N: usize>(
     [xx, xy, xz, yy, yz, zz]: [&[f32; N]; 6],
@@ -127,7 +128,8 @@ pub(crate) fn sggx_roughness<const N: usize>(
 }
 
 /// [`sggx_from_ggx`](kinran_shading::sggx_from_ggx) for normals with z ≥ 0, in two thirds of the operations: with
-/// `p = n.xy` and `k = 1 / (1 + n.z)`, the upper rows of [`m_n`] are `I - k p p^T`, the last one is `-p^T`.
+/// `p = n.xy` and `k = 1 / (1 + n.z)`, the first two columns of [`m_n`](kinran_shading::m_n) are `I - k p p^T` over
+/// `-p^T`.
 #[inline(always)]
 fn sggx_of_texel(n: Vec3, a: Sym2) -> Sym3 {
     let k = (1.0 + n.z).recip();
