@@ -5,7 +5,8 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 use glam::{Vec3, vec3};
 
-/// Lanes of an [`F8`].
+/// Lanes of an [`F8`]: those of an AVX2 vector. Of sixteen, the sums and the frames of a filter do not fit into its
+/// sixteen registers.
 pub(crate) const LANES: usize = 8;
 
 /// Eight floats; every operation is IEEE-exact per lane and never fused, so that all instruction sets give
