@@ -10,6 +10,8 @@ use crate::{Error, Progress};
 pub struct Console {
     /// Errors only.
     pub quiet: bool,
+    /// Also what went well, one by one.
+    pub verbose: bool,
     /// Results as JSON.
     pub json: bool,
     /// Shows these bars, whatever is said above: those of work that is a part of other work.

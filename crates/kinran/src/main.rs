@@ -37,6 +37,10 @@ struct Cli {
     #[arg(long, short, global = true)]
     quiet: bool,
 
+    /// Says more: a line for each thing that went well
+    #[arg(long, short, global = true, conflicts_with = "quiet")]
+    verbose: bool,
+
     /// The summary as JSON on standard output, for programs; implies no progress
     #[arg(long, global = true)]
     json: bool,
@@ -62,7 +66,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let console = Console { quiet: cli.quiet, json: cli.json, bars: None };
+    let console = Console { quiet: cli.quiet, verbose: cli.verbose, json: cli.json, bars: None };
     match start_threads(cli.threads).and_then(|()| run(&cli.command, &console)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -484,7 +484,7 @@ impl Library {
         self.cache.remove(key)?;
         let work = self.cache.work_folder()?;
         let output = files_of(&work);
-        let silent = Console { quiet: true, json: false, bars: Some(bars.of(&job.name)) };
+        let silent = Console { quiet: true, bars: Some(bars.of(&job.name)), ..Console::default() };
         let reports = match flags {
             Flags::Bake(flags) => {
                 let flags = Args { input: job.input.clone(), output: Some(output), ..(**flags).clone() };
