@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Holds curvature of real meshes against libigl and PyMeshLab, which are installed into .tools/curvature.
-# Usage: tools/check_curvature/check.sh KINRAN MESH.obj... Prints a table; fails where medians are apart.
+# Holds curvature of meshes, or without any of two made here, against libigl and PyMeshLab, which are installed into .tools/curvature.
+# Usage: tools/check_curvature/check.sh KINRAN [MESH.obj...] Prints a table; fails where medians are apart.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)

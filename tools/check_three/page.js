@@ -57,12 +57,16 @@ async function load(role, url) {
 	const gltf = await gltfLoader.loadAsync(url);
 	models[role] = gltf.scene;
 	const { json, associations } = gltf.parser;
+	// Of a map on a second set of UVs three.js makes a copy, of which the parser knows nothing but its image.
+	const ofImage = new Map();
+	for (const [object, { textures }] of associations) if (object.isTexture) ofImage.set(object.source, textures);
+	const indexOf = (texture) => associations.get(texture)?.textures ?? ofImage.get(texture.source);
 	const seen = new Map();
 	gltf.scene.traverse((node) => {
 		for (const material of [node.material ?? []].flat())
 			for (const [slot, texture] of Object.entries(material))
 				if (texture?.isTexture) {
-					const index = associations.get(texture).textures;
+					const index = indexOf(texture);
 					if (!seen.has(texture)) seen.set(texture, { index, slots: new Set() });
 					seen.get(texture).slots.add(slot);
 				}

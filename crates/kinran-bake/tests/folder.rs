@@ -2,6 +2,9 @@
 
 #![allow(clippy::print_stdout, reason = "tests say what they skip and measure")]
 
+#[path = "../../sample_assets.rs"]
+mod sample_assets;
+
 use std::f32::consts::{PI, TAU};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,6 +18,7 @@ use kinran_bake::folder::{
 use kinran_image::{Channels, Image, Pixels, read_image, write_png};
 use kinran_shading::ALPHA_MIN;
 use proptest::prelude::*;
+use sample_assets::sample_assets;
 
 /// A folder of empty files; enough for scanning.
 fn folder_of(names: &[&str]) -> tempfile::TempDir {
@@ -743,18 +747,6 @@ fn maps_of_different_sizes_are_taken() {
 
 // Real files
 
-fn assets() -> Option<PathBuf> {
-    let path = std::env::var_os("KINRAN_ASSETS").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/assets")),
-        PathBuf::from,
-    );
-    if path.join("materials").is_dir() {
-        return Some(path);
-    }
-    println!("skipped: no assets at {}", path.display());
-    None
-}
-
 fn material_folders(assets: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(assets.join("materials")).unwrap();
     let mut folders: Vec<PathBuf> = entries.map(|e| e.unwrap().path()).filter(|p| p.is_dir()).collect();
@@ -763,8 +755,8 @@ fn material_folders(assets: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn every_real_material_is_understood() {
-    let Some(assets) = assets() else { return };
+fn sample_assets_are_not_understood() {
+    let Some(assets) = sample_assets() else { return };
     let mut surfaces = 0;
     for folder in material_folders(&assets) {
         let has = |name: &str| folder.join(name).exists();
@@ -826,8 +818,8 @@ fn green_by_height(normal: &Image, height: &Image) -> Green {
 }
 
 #[test]
-fn the_curl_never_contradicts_height_maps_labels_and_formats() {
-    let Some(assets) = assets() else { return };
+fn the_curl_of_sample_assets_contradicts_height_maps_labels_and_formats() {
+    let Some(assets) = sample_assets() else { return };
     let mut files: Vec<(PathBuf, Green)> = Vec::new();
     for folder in material_folders(&assets) {
         let (normal, height) = (folder.join("normal.png"), folder.join("height.png"));
@@ -864,8 +856,8 @@ fn the_curl_never_contradicts_height_maps_labels_and_formats() {
 }
 
 #[test]
-fn no_real_map_of_another_kind_passes_for_normals() {
-    let Some(assets) = assets() else { return };
+fn sample_assets_of_another_kind_pass_for_normals() {
+    let Some(assets) = sample_assets() else { return };
     let mut count = 0;
     for folder in material_folders(&assets) {
         let mut files: Vec<PathBuf> = fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path()).collect();

@@ -1,9 +1,7 @@
 //! Khronos' test models, judged by what their own labels say.
-//!
-//! The models are looked for in the folder named by `KINRAN_ASSETS`, else beside the workspace; without them the
-//! tests say that they are skipped.
 
-#![allow(clippy::print_stderr, reason = "a skipped test says so")]
+#[path = "../../sample_assets.rs"]
+mod sample_assets;
 
 use glam::{Vec2, Vec3, vec2, vec3};
 use kinran_image::Transfer;
@@ -13,21 +11,15 @@ use kinran_render::reference::{
 };
 use kinran_scene::{Environment, Light, Material, Scene, Wrap};
 use kinran_shading::{alphas_from_khr_anisotropy, aniso_encode, aniso_from_alphas};
-use std::{path::PathBuf, sync::Arc};
+use sample_assets::sample_assets;
+use std::sync::Arc;
 
 #[allow(dead_code, reason = "other tests use all of it")]
 mod shapes;
 
 fn load(model: &str) -> Option<Scene> {
-    let assets = std::env::var_os("KINRAN_ASSETS").map(PathBuf::from);
-    let assets =
-        assets.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/assets").into());
-    let path = assets.join("meshes").join(model);
-    if !path.exists() {
-        eprintln!("skipped: {model} is not in the assets folder (set KINRAN_ASSETS)");
-        return None;
-    }
-    Some(Scene::load(&path).unwrap())
+    let assets = sample_assets()?;
+    Some(Scene::load(assets.join("meshes").join(model)).unwrap())
 }
 
 /// Level 0 of a material's `KHR_materials_anisotropy` on flat normals, its rotation times `sense`.
@@ -93,7 +85,7 @@ fn difference(a: &[Vec3], b: &[Vec3]) -> f32 {
 }
 
 #[test]
-fn all_bands_of_the_anisotropy_rotation_test_look_alike() {
+fn sample_assets_with_bands_turned_alike_differ() {
     let Some(mut scene) = load("anisotropy_rotation_test/AnisotropyRotationTest.glb") else { return };
     let lights: Vec<Light> =
         [vec3(-0.3, -0.5, -1.0), vec3(0.7, 0.1, -1.0)].map(|d| shapes::directional(d, 1.0)).into();
@@ -126,7 +118,7 @@ fn all_bands_of_the_anisotropy_rotation_test_look_alike() {
 }
 
 #[test]
-fn the_normal_tangent_test_s_mapped_bumps_look_like_its_modelled_ones() {
+fn bumps_mapped_in_sample_assets_look_unlike_modelled_ones() {
     let Some(scene) = load("normal_tangent_test/NormalTangentTest.glb") else { return };
     let [min, max] = scene.bounds().unwrap();
     let place = scene.materials[0].normal.clone().unwrap();

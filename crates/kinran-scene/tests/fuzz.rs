@@ -125,8 +125,8 @@ fn a_layer_survives_writing_and_leaves_a_sheen_for_others() {
 }
 
 #[test]
-fn the_sheen_chair_has_sheen() {
-    let Some(assets) = common::assets() else { return };
+fn sample_assets_lose_their_sheen() {
+    let Some(assets) = common::sample_assets() else { return };
     let scene = Scene::load(assets.join("meshes/sheen_chair/SheenChair.gltf")).unwrap();
     assert!(scene.materials.iter().any(|m| matches!(m.fuzz, Some(Fuzz::Layer(_)))), "no fuzz was read");
 }

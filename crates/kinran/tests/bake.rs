@@ -8,6 +8,8 @@
 #[allow(dead_code, reason = "shared with the other commands' tests")]
 #[path = "commands/common.rs"]
 mod common;
+#[path = "../../sample_assets.rs"]
+mod sample_assets;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,6 +20,7 @@ use common::{bumps, files, glb, kinran, kinran_json, refused, square, text};
 use kinran_image::{
     Channels, Format, Image, Pixels, Texture, Transfer, decode_image, encode_png, read_image, read_texture,
 };
+use sample_assets::sample_assets;
 use serde_json::{Value, json};
 
 fn write(folder: &Path, name: &str, image: &Image) {
@@ -516,22 +519,10 @@ fn a_killed_run_leaves_half_a_file() {
     }
 }
 
-fn assets() -> Option<PathBuf> {
-    let assets = std::env::var_os("KINRAN_ASSETS").map_or_else(
-        || Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/assets")).to_path_buf(),
-        PathBuf::from,
-    );
-    if assets.is_dir() {
-        return Some(assets);
-    }
-    println!("skipped: {} is absent; set KINRAN_ASSETS", assets.display());
-    None
-}
-
 /// Authored by others; presets and filter are the fastest, the maps are large.
 #[test]
-fn real_materials_do_not_bake() {
-    let Some(assets) = assets() else { return };
+fn sample_assets_do_not_bake() {
+    let Some(assets) = sample_assets() else { return };
     for name in [
         "meshes/anisotropy_barn_lamp",
         "meshes/anisotropy_disc_test",

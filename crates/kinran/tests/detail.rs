@@ -5,12 +5,15 @@
 #[allow(dead_code, reason = "shared with the other commands' tests")]
 #[path = "commands/common.rs"]
 mod common;
+#[path = "../../sample_assets.rs"]
+mod sample_assets;
 
 use std::path::{Path, PathBuf};
 
 use common::{files, kinran, kinran_json, refused, text};
 use kinran_image::{Channels, Image, Pixels, read_image, read_texture, write_png};
 use kinran_scene::{DetailMap, Scene};
+use sample_assets::sample_assets;
 use serde_json::Value;
 
 /// Slow colours with grain, the same everywhere.
@@ -320,16 +323,9 @@ fn what_cannot_be_meant_is_refused() {
 
 /// Scanned materials, small: every one against its own tiles and another's.
 #[test]
-fn sample_materials_are_solved_better_than_by_the_talk() {
-    let assets = std::env::var_os("KINRAN_ASSETS").map_or_else(
-        || Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/assets")).to_path_buf(),
-        PathBuf::from,
-    );
+fn sample_assets_are_solved_better_than_by_the_talk() {
+    let Some(assets) = sample_assets() else { return };
     let wanted = ["acg_metal007", "acg_rock023", "ph_plank_flooring"];
-    if !wanted.iter().all(|name| assets.join("materials").join(name).is_dir()) {
-        println!("skipped: {} is absent; set KINRAN_ASSETS", assets.display());
-        return;
-    }
     let folder = Folder::new();
     let materials = folder.path("materials");
     for name in wanted {

@@ -2,6 +2,10 @@
 
 #![allow(clippy::print_stdout, reason = "the tests tell how near their bounds are")]
 
+#[cfg(feature = "gpu")]
+#[path = "../../sample_assets.rs"]
+mod sample_assets;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -238,8 +242,7 @@ fn between_the_tilts_of_a_fit_its_error_stays_within_what_is_stated() {
 
 #[cfg(feature = "gpu")]
 mod realtime {
-    use std::path::{Path, PathBuf};
-
+    use crate::sample_assets::sample_assets;
     use glam::{Affine3A, Vec3, vec2, vec3};
     use kinran::surfaces::fuzz_fits;
     use kinran_render::metrics::flip;
@@ -391,18 +394,12 @@ mod realtime {
 
     /// `kinran fuzz --sheet realtime` on the assets that the pictures show.
     #[test]
-    fn velvety_horse_and_crushed_velvet_are_near_the_reference() {
+    fn sample_assets_in_velvet_are_near_the_reference() {
         if let Err(e) = Gpu::open() {
             assert!(std::env::var_os("KINRAN_REQUIRE_GPU").is_none(), "{e}");
             return println!("SKIPPED: {e}");
         }
-        let assets = std::env::var_os("KINRAN_ASSETS").map_or_else(
-            || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/assets"),
-            PathBuf::from,
-        );
-        if !assets.is_dir() {
-            return println!("SKIPPED: no sample assets; KINRAN_ASSETS names their folder");
-        }
+        let Some(assets) = sample_assets() else { return };
         let velvet = "--density 0.5 --spread 0.1 --tilt 50 --direction swirl --color 0.5,0.05,0.1";
         for (what, model, fibres) in [
             ("velvety horse", "meshes/horse_statue_01/horse_statue_01_1k.gltf", ""),

@@ -9,11 +9,15 @@
     reason = "the numbers are what the documentation quotes, and skipped tests say so"
 )]
 
+#[path = "../../sample_assets.rs"]
+mod sample_assets;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use kinran_image::{Channels, Image, Pixels, read_image, write_png};
 use kinran_render::metrics::flip;
+use sample_assets::sample_assets;
 
 /// The largest mean FLIP.
 const WANTED: f64 = 0.05;
@@ -87,12 +91,7 @@ const STUDIO: [&str; 2] = ["--env", "studio"];
 
 #[test]
 fn sample_assets_look_as_in_the_reference() {
-    let assets = std::env::var_os("KINRAN_ASSETS")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/assets"), PathBuf::from);
-    if !assets.exists() {
-        eprintln!("SKIPPED: no sample assets at {} (set KINRAN_ASSETS)", assets.display());
-        return;
-    }
+    let Some(assets) = sample_assets() else { return };
     let (folder, _guard) = pictures();
     let models = [
         ("barn_lamp", "anisotropy_barn_lamp/AnisotropyBarnLamp.gltf"),

@@ -5,6 +5,10 @@
     reason = "the numbers are what the documentation quotes, and skipped tests say so"
 )]
 
+#[cfg(feature = "gpu")]
+#[path = "../../sample_assets.rs"]
+mod sample_assets;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -537,6 +541,7 @@ fn pixels(path: &Path) -> (Vec<[u8; 3]>, u32) {
 #[cfg(feature = "gpu")]
 mod both {
     use super::*;
+    use crate::sample_assets::sample_assets;
     use kinran_render::metrics::flip;
 
     /// Mean FLIP of the GPU's picture beside the reference's.
@@ -590,16 +595,9 @@ mod both {
     }
 
     #[test]
-    fn a_head_looks_as_in_the_reference() {
-        let assets = std::env::var_os("KINRAN_ASSETS").map_or_else(
-            || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/assets"),
-            PathBuf::from,
-        );
+    fn sample_assets_of_skin_look_as_in_the_reference() {
+        let Some(assets) = sample_assets() else { return };
         let head = assets.join("meshes/lee_perry_smith/LeePerrySmith.gltf");
-        if !head.exists() {
-            eprintln!("SKIPPED: no sample assets at {} (set KINRAN_ASSETS)", assets.display());
-            return;
-        }
         let (folder, _guard) = pictures();
         let baked = bake(&head, &folder.join("out"), "50", &["--container", "dds", "--preset", "fast"]);
         let mut results = Vec::new();

@@ -1,17 +1,9 @@
 //! What several tests need.
 
-use std::path::{Path, PathBuf};
+#[path = "../../../sample_assets.rs"]
+mod sample_assets;
 
-/// The folder of test assets: `KINRAN_ASSETS`, or one beside the workspace.
-pub(crate) fn assets() -> Option<PathBuf> {
-    let folder = std::env::var_os("KINRAN_ASSETS")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/assets"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("SKIPPED: no test assets at {}; set KINRAN_ASSETS to their folder", folder.display());
-    None
-}
+pub(crate) use sample_assets::sample_assets;
 
 /// File, triangles in meshes as the assets' README counts them, triangles as placed in the scene, materials.
 pub(crate) const DOCUMENTS: [(&str, usize, usize, usize); 11] = [
