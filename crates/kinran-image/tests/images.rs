@@ -1,5 +1,7 @@
 //! Image files in and out, against files of other writers (tests/data/make.py), damaged and hostile ones.
 
+#![allow(clippy::print_stderr, reason = "a skipped test says so")]
+
 #[path = "../../sample_assets.rs"]
 mod sample_assets;
 
