@@ -10,6 +10,7 @@ pub mod fuzz_fit;
 pub mod manifest;
 mod material;
 mod mips;
+mod patterns;
 pub mod skin_lut;
 pub mod stamps;
 

@@ -38,6 +38,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::folder::EXTENSIONS;
+use crate::patterns::PathPattern;
 
 /// Bytes of the manifest's text.
 pub type Place = Range<usize>;
@@ -292,17 +293,17 @@ impl Manifest {
     }
 
     /// What there is to bake, in the order of the file and of names; for an input that is not there an error
-    /// in its place, so that others can go on.
-    pub fn jobs(&self) -> Vec<Result<Job, ManifestError>> {
+    /// in its place, so that others can go on. Patterns leave out what `skip` names, with all that is in it.
+    pub fn jobs(&self, skip: &dyn Fn(&Path) -> bool) -> Vec<Result<Job, ManifestError>> {
         let mut jobs: Vec<Result<Job, ManifestError>> = Vec::new();
         for entry in &self.entries {
-            let excluded = self.excluded(entry);
+            let excluded = self.excluded(entry, skip);
             if entry.inputs.is_empty() {
                 let job = self.job(entry, &entry.place, PathBuf::new(), &jobs);
                 jobs.push(job);
             }
             for (pattern, place) in &entry.inputs {
-                match self.matches(entry.kind, pattern, place) {
+                match self.matches(entry.kind, pattern, place, skip) {
                     Err(error) => jobs.push(Err(error)),
                     Ok(paths) => {
                         for input in paths.into_iter().filter(|path| !excluded.contains(path)) {
@@ -359,9 +360,15 @@ impl Manifest {
     }
 
     /// The inputs that a pattern stands for, by name; one without wildcards stands for itself.
-    fn matches(&self, kind: Kind, pattern: &str, place: &Place) -> Result<Vec<PathBuf>, ManifestError> {
+    fn matches(
+        &self,
+        kind: Kind,
+        pattern: &str,
+        place: &Place,
+        skip: &dyn Fn(&Path) -> bool,
+    ) -> Result<Vec<PathBuf>, ManifestError> {
         let path = self.beside(pattern);
-        if !pattern.contains(['*', '?', '[']) {
+        if !PathPattern::is_one(pattern) {
             return match kind.accepts(&path) {
                 true => Ok(vec![path]),
                 false if path.exists() => {
@@ -372,33 +379,40 @@ impl Manifest {
                 }
             };
         }
-        let paths = self.glob(pattern, place)?;
-        let mut found: Vec<PathBuf> = paths.into_iter().filter(|path| kind.accepts(path)).collect();
-        found.sort();
+        let mut found = self
+            .pattern(pattern, place)?
+            .matches(skip)
+            .map_err(|e| self.error(place, format!("{pattern}: {e}")))?;
+        found.retain(|path| kind.accepts(path));
         match found.is_empty() {
             true => Err(self.error(place, format!("{pattern} matches nothing; expected {}", kind.inputs()))),
             false => Ok(found),
         }
     }
 
-    fn excluded(&self, entry: &Entry) -> BTreeSet<PathBuf> {
+    fn excluded(&self, entry: &Entry, skip: &dyn Fn(&Path) -> bool) -> BTreeSet<PathBuf> {
         // Patterns were checked when the entry was read.
-        entry
-            .exclude
-            .iter()
-            .flat_map(|(pattern, place)| self.glob(pattern, place).unwrap_or_default())
-            .collect()
+        let patterns = entry.exclude.iter().filter_map(|(text, place)| self.pattern(text, place).ok());
+        patterns.flat_map(|pattern| pattern.matches(skip).unwrap_or_default()).collect()
     }
 
-    /// Existing paths, hidden ones left out.
-    fn glob(&self, pattern: &str, place: &Place) -> Result<Vec<PathBuf>, ManifestError> {
-        let folder = glob::Pattern::escape(&beside(&self.path).to_string_lossy());
-        let full =
-            if Path::new(pattern).is_absolute() { pattern.into() } else { format!("{folder}/{pattern}") };
-        let options = glob::MatchOptions { require_literal_leading_dot: true, ..Default::default() };
-        let paths = glob::glob_with(&full, options)
-            .map_err(|e| self.error(place, format!("{pattern} is no pattern: {}", e.msg)))?;
-        paths.map(|path| path.map_err(|e| self.error(place, e.to_string()))).collect()
+    fn pattern(&self, text: &str, place: &Place) -> Result<PathPattern, ManifestError> {
+        PathPattern::new(beside(&self.path), text)
+            .map_err(|e| self.error(place, format!("{text} is no pattern: {e}")))
+    }
+
+    /// Folders in which inputs are or may appear, and whether that is anywhere below them.
+    pub fn input_folders(&self) -> BTreeMap<PathBuf, bool> {
+        let mut folders = BTreeMap::new();
+        for (kind, (text, place)) in self.entries.iter().flat_map(|e| e.inputs.iter().map(|i| (e.kind, i))) {
+            let (folder, deep) = match self.pattern(text, place) {
+                Ok(pattern) if PathPattern::is_one(text) => (pattern.root().to_path_buf(), true),
+                _ if kind == Kind::Aniso => (self.beside(text), false),
+                _ => (beside(&self.beside(text)).to_path_buf(), false),
+            };
+            *folders.entry(folder).or_default() |= deep;
+        }
+        folders
     }
 
     /// A path that starts from the manifest's folder.
@@ -470,7 +484,7 @@ impl Manifest {
                 "exclude" => {
                     entry.exclude = self.texts(value)?;
                     for (pattern, place) in &entry.exclude {
-                        self.glob(pattern, place)?;
+                        self.pattern(pattern, place)?;
                     }
                 }
                 "output" => {
@@ -603,7 +617,7 @@ fn kind_of(value: &DeValue) -> &'static str {
     }
 }
 
-/// Bytes of `10 GiB`, `500MB` and the like.
+/// Bytes of `10 GiB`, `500MB` and the like; a number alone is refused, since it may be meant in any unit.
 ///
 /// # Errors
 /// A sentence that says how to write it.
@@ -611,7 +625,7 @@ pub fn size(text: &str) -> Result<u64, String> {
     let text = text.trim();
     let end = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
     let unit = match text[end..].trim().to_ascii_lowercase().as_str() {
-        "" | "b" => Some(1.0),
+        "b" => Some(1.0),
         "kb" => Some(1e3),
         "mb" => Some(1e6),
         "gb" => Some(1e9),

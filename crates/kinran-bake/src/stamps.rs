@@ -1,15 +1,16 @@
 //! Hashes of files, remembered for as long as the files look the same.
 
 use std::collections::BTreeMap;
-use std::fs::{self, Metadata};
+use std::fs::{self, File, Metadata};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use kinran_image::{Error, write_atomically};
 use serde::{Deserialize, Serialize};
 
-use crate::cache::hash_file;
+use crate::cache::hash_open;
 
 /// Coarsest clock of a file system in use (FAT: 2 s). A file that was changed so shortly before it was hashed may
 /// be changed again without looking so.
@@ -21,6 +22,10 @@ pub struct Stamp {
     bytes: u64,
     /// Nanoseconds since 1970; 0 where the system does not tell.
     modified: u64,
+    /// Nanoseconds since 1970 at which the content or what is known of the file changed last, which nobody can set back; 0
+    /// where the system does not tell.
+    #[serde(default)]
+    changed: u64,
     /// 0 where the system has none.
     inode: u64,
 }
@@ -32,22 +37,33 @@ impl Stamp {
         metadata.is_file().then(|| Stamp::from(&metadata))
     }
 
+    /// Whether the content looks as it did; the file may have been renamed meanwhile.
+    pub fn has_content_of(&self, other: &Stamp) -> bool {
+        (self.bytes, self.modified) == (other.bytes, other.modified)
+    }
+
     /// Whether the file was changed so shortly before `now` that it may change again without looking so.
     fn is_fresh(&self, now: SystemTime) -> bool {
-        let modified = UNIX_EPOCH + Duration::from_nanos(self.modified);
-        now.duration_since(modified).map_or(true, |age| age < CLOCK_STEP)
+        // One that was copied here with its old time was changed when it came.
+        let latest = UNIX_EPOCH + Duration::from_nanos(self.modified.max(self.changed));
+        now.duration_since(latest).map_or(true, |age| age < CLOCK_STEP)
     }
 }
 
 impl From<&Metadata> for Stamp {
     fn from(metadata: &Metadata) -> Stamp {
         #[cfg(unix)]
-        let inode = std::os::unix::fs::MetadataExt::ino(metadata);
+        let (inode, changed) = {
+            use std::os::unix::fs::MetadataExt;
+            let nanoseconds =
+                i128::from(metadata.ctime()) * 1_000_000_000 + i128::from(metadata.ctime_nsec());
+            (metadata.ino(), u64::try_from(nanoseconds).unwrap_or(0))
+        };
         #[cfg(not(unix))]
-        let inode = 0;
+        let (inode, changed) = (0, 0);
         let modified = metadata.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
         let modified = modified.map_or(0, |time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX));
-        Stamp { bytes: metadata.len(), modified, inode }
+        Stamp { bytes: metadata.len(), modified, changed, inode }
     }
 }
 
@@ -64,20 +80,24 @@ struct Seen {
 #[derive(Debug, Default)]
 pub struct Stamps {
     seen: Mutex<BTreeMap<PathBuf, Seen>>,
+    is_news: AtomicBool,
 }
 
 impl Stamps {
     /// What was saved at `path`; nothing where there is no such file or it is damaged, which costs time only.
     pub fn load(path: &Path) -> Stamps {
         let seen = fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        Stamps { seen: Mutex::new(seen.unwrap_or_default()) }
+        Stamps { seen: Mutex::new(seen.unwrap_or_default()), is_news: AtomicBool::new(false) }
     }
 
-    /// Saves what is known.
+    /// Saves what is known, if that is more than what was loaded or saved last.
     ///
     /// # Errors
     /// [`Error::Io`].
     pub fn save(&self, path: &Path) -> Result<(), Error> {
+        if !self.is_news.swap(false, Ordering::Relaxed) {
+            return Ok(());
+        }
         let json = serde_json::to_vec(&*self.lock()).map_err(|e| Error::io(path, e.into()))?;
         write_atomically(path, &json)
     }
@@ -92,35 +112,45 @@ impl Stamps {
         if let Some(seen) = known {
             return Ok(seen.blake3);
         }
+        let fail = |e| Error::io(path, e);
         let now = SystemTime::now();
-        let (_, blake3) = hash_file(path)?;
-        if let Some(stamp) = stamp.filter(|stamp| !stamp.is_fresh(now)) {
-            self.lock().insert(path.into(), Seen { stamp, blake3: blake3.clone(), refers_to: None });
+        let mut file = File::open(path).map_err(fail)?;
+        let before = Stamp::from(&file.metadata().map_err(fail)?);
+        let (_, blake3) = hash_open(&mut file).map_err(fail)?;
+        // What is remembered of a path must be what was read, though others may save or rename files meanwhile.
+        let stayed = file.metadata().is_ok_and(|after| Stamp::from(&after) == before);
+        if stayed && Stamp::of(path).as_ref() == Some(&before) && !before.is_fresh(now) {
+            self.remember(path, Seen { stamp: before, blake3: blake3.clone(), refers_to: None });
         }
         Ok(blake3)
     }
 
-    /// The files that a file refers to, as `read` finds them; `read` is asked only if the file looks other than
-    /// when it was last asked.
+    /// The files that a file refers to, as `read` finds them in its bytes; `read` is asked only if the file looks other
+    /// than when it was last asked.
     ///
     /// # Errors
     /// Whatever `read` returns, and [`Error::Io`] as an `E`.
     pub fn refers_to<E: From<Error>>(
         &self,
         path: &Path,
-        read: impl FnOnce() -> Result<Vec<PathBuf>, E>,
+        read: impl FnOnce(&[u8]) -> Result<Vec<PathBuf>, E>,
     ) -> Result<Vec<PathBuf>, E> {
-        let blake3 = self.hash(path)?;
-        let known =
-            self.lock().get(path).filter(|seen| seen.blake3 == blake3).and_then(|s| s.refers_to.clone());
-        if let Some(files) = known {
+        let hash = self.hash(path)?;
+        let known = self.lock().get(path).filter(|seen| seen.blake3 == hash).cloned();
+        if let Some(files) = known.as_ref().and_then(|seen| seen.refers_to.clone()) {
             return Ok(files);
         }
-        let files = read()?;
-        if let Some(seen) = self.lock().get_mut(path).filter(|seen| seen.blake3 == blake3) {
-            seen.refers_to = Some(files.clone());
+        let bytes = fs::read(path).map_err(|e| Error::io(path, e))?;
+        let files = read(&bytes)?;
+        if let Some(seen) = known.filter(|seen| seen.blake3 == blake3::hash(&bytes).to_hex().as_str()) {
+            self.remember(path, Seen { refers_to: Some(files.clone()), ..seen });
         }
         Ok(files)
+    }
+
+    fn remember(&self, path: &Path, seen: Seen) {
+        self.lock().insert(path.into(), seen);
+        self.is_news.store(true, Ordering::Relaxed);
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, BTreeMap<PathBuf, Seen>> {

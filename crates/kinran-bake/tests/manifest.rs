@@ -27,7 +27,7 @@ fn library() -> tempfile::TempDir {
 
 fn jobs(root: &Path, text: &str) -> Vec<Result<Job, String>> {
     let manifest = Manifest::parse(&root.join("kinran.toml"), text.into()).unwrap();
-    manifest.jobs().into_iter().map(|job| job.map_err(|e| e.to_string())).collect()
+    manifest.jobs(&|_| false).into_iter().map(|job| job.map_err(|e| e.to_string())).collect()
 }
 
 fn names(jobs: &[Result<Job, String>]) -> Vec<&str> {
@@ -43,6 +43,7 @@ fn a_mistake_is_told_without_its_place_or_what_was_expected() {
         ("ouput = \"x\"\n", 1, 1, "unknown key `ouput`; expected output, cache"),
         ("# héllo\noutput = 3\n", 2, 10, "expected a string, found an integer"),
         ("cache-limit = \"much\"\n", 1, 15, "much is no size; write a number and a unit, such as 10 GiB"),
+        ("cache-limit = \"20\"\n", 1, 15, "20 is no size; write a number and a unit, such as 10 GiB"),
         ("[aniso]\ninput = \"a\"\n", 1, 1, "expected [[aniso]] with two brackets"),
         ("[[aniso]]\nfilter = \"ml\"\n", 1, 1, "this entry has no `input`; expected a folder of maps"),
         ("[[aniso]]\ninput = [\"a\", 7]\n", 2, 15, "expected a string, found an integer"),
@@ -88,6 +89,26 @@ fn patterns_find_what_is_hidden_excluded_or_of_another_kind() {
     let first = found[0].as_ref().unwrap();
     assert_eq!((first.kind, first.folder.as_path()), (Kind::Mesh, Path::new("helmet")));
     assert_eq!(first.input, root.path().join("models/helmet.gltf"));
+}
+
+#[cfg(unix)]
+#[test]
+fn links_that_lead_back_are_followed_for_ever() {
+    use std::os::unix::fs::symlink;
+    let root = library();
+    let link = |to: &str, at: &str| symlink(root.path().join(to), root.path().join(at)).unwrap();
+    // Two in one folder: without a look at where they lead there are 2^40 paths.
+    link("models", "models/again");
+    link("models", "models/and_again");
+    link("", "materials/up");
+    link("nowhere", "models/lost");
+    let found = jobs(root.path(), "[[mesh]]\ninput = \"**/*.glb\"\n");
+    assert_eq!(names(&found), ["models/lamp.glb"]);
+    // A link to another folder is followed, once.
+    let found = jobs(root.path(), "[[mesh]]\ninput = \"materials/**/*.glb\"\n");
+    assert_eq!(names(&found), ["materials/up/models/lamp.glb"]);
+    let found = jobs(root.path(), "[[aniso]]\ninput = \"./materials/*\"\nexclude = \"materials/up/\"\n");
+    assert_eq!(names(&found), ["materials/steel", "materials/twill", "materials/wip_felt"]);
 }
 
 #[test]
@@ -157,7 +178,7 @@ fn an_entry_cannot_undo_a_default() {
 #[test]
 fn sizes_are_misread() {
     for (text, bytes) in [
-        ("12", 12),
+        ("12 B", 12),
         ("10 GiB", 10 << 30),
         ("1.5kib", 1536),
         ("500 MB", 500_000_000),
@@ -165,7 +186,8 @@ fn sizes_are_misread() {
     ] {
         assert_eq!(size(text), Ok(bytes), "{text:?}");
     }
-    for text in ["", "GiB", "-1", "1 GiBi", "1e3", "nan", "1.2.3 MB"] {
+    // A number alone: 20 bytes, or 20 GiB?
+    for text in ["", "20", "0", "GiB", "-1", "1 GiBi", "1e3", "nan", "1.2.3 MB"] {
         assert!(size(text).is_err(), "{text:?} became {:?}", size(text));
     }
 }

@@ -12,6 +12,7 @@ mod ktx2_file;
 mod read;
 mod texture;
 mod texture_file;
+mod unfinished;
 mod write;
 
 pub use block::{Encoder, Encoding, Preset, Role, decode, encode, encode_half, encode_parallel};
@@ -22,6 +23,8 @@ pub use ktx2_file::{decode_ktx2, encode_ktx2};
 pub use read::{decode_image, read_image};
 pub use texture::{Format, Level, Texture, Transfer, full_level_count, level_size};
 pub use texture_file::{decode_texture, read_texture, write_texture};
+pub use unfinished::{Unfinished, remove_unfinished};
 pub use write::{
-    encode_png, write_atomically, write_atomically_in, write_atomically_with, write_exr, write_png,
+    encode_png, is_temporary, write_atomically, write_atomically_in, write_atomically_with, write_exr,
+    write_png,
 };

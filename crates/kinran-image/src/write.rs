@@ -1,8 +1,10 @@
 //! Image files out, and files that appear whole or not at all.
 
-use std::fs::File;
+use std::collections::BTreeSet;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Cursor, Seek, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use exr::prelude::{
     AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Layer, LayerAttributes, LineOrder,
@@ -10,11 +12,13 @@ use exr::prelude::{
 };
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
+use tempfile::NamedTempFile;
 
-use crate::{Channels, Error, Image, Pixels};
+use crate::{Channels, Error, Image, Pixels, Unfinished};
 
 /// Writes a file by a temporary one in the same folder, flushed to disk and renamed: whatever happens,
-/// `path` holds its old content or all of the new, and no temporary file stays behind.
+/// `path` holds its old content or all of the new. No temporary file stays behind, but where the process is killed:
+/// then the next one that writes into the folder removes it.
 ///
 /// # Errors
 /// [`Error::Io`] naming `path`: the folder is missing or read-only, the disk is full.
@@ -52,15 +56,9 @@ fn write_by_rename(
     if path.is_dir() {
         return Err(fail(io::ErrorKind::IsADirectory.into()));
     }
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".kinran-");
-    // The default is a private file; this one is meant to be seen, as far as the umask allows.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut temporary = builder.tempfile_in(folder).map_err(|e| {
-        // tempfile's own message would name the temporary file.
-        fail(e.kind().into())
-    })?;
+    // tempfile's own message would name the temporary file.
+    let (_unfinished, mut temporary) =
+        Unfinished::make(|| temporary_file(folder)).map_err(|e| fail(e.kind().into()))?;
 
     let mut buffered = BufWriter::with_capacity(1 << 20, temporary.as_file_mut());
     write(&mut buffered).and_then(|()| buffered.flush()).map_err(fail)?;
@@ -68,6 +66,58 @@ fn write_by_rename(
     temporary.as_file().sync_all().map_err(fail)?;
     temporary.persist(path).map_err(|e| fail(e.error))?;
     Ok(())
+}
+
+/// What the names of temporary files begin and end with, and how many letters and digits are between.
+const TEMPORARY: (&str, usize, &str) = (".kinran-", 16, ".part");
+
+/// Whether a file's name is one that [`write_atomically`] gives its temporary files.
+pub fn is_temporary(name: &str) -> bool {
+    let (prefix, length, suffix) = TEMPORARY;
+    let random = name.strip_prefix(prefix).and_then(|name| name.strip_suffix(suffix));
+    random.is_some_and(|r| r.len() == length && r.bytes().all(|b| b.is_ascii_alphanumeric()))
+}
+
+/// A temporary file that is locked as long as it is open, so that others know that somebody is at work on it.
+fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
+    remove_abandoned(folder);
+    let (prefix, length, suffix) = TEMPORARY;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(prefix).rand_bytes(length).suffix(suffix);
+    // The default is a private file; this one is meant to be seen, as far as the umask allows.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    loop {
+        let file = builder.tempfile_in(folder)?;
+        // A file system without locks: nobody removes the file there, since nobody can tell.
+        let _ = file.as_file().lock();
+        // Before it was locked somebody may have taken it for abandoned.
+        if file.path().exists() {
+            return Ok(file);
+        }
+    }
+}
+
+/// Folders that were looked through for abandoned files.
+static LOOKED_THROUGH: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Removes temporary files that nobody is at work on any more; of every folder once.
+fn remove_abandoned(folder: &Path) {
+    let mut looked_through = LOOKED_THROUGH.lock().unwrap_or_else(PoisonError::into_inner);
+    if !looked_through.insert(folder.to_path_buf()) {
+        return;
+    }
+    // What cannot be looked at or removed is none of the caller's troubles.
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        if !is_file || !entry.file_name().to_str().is_some_and(is_temporary) {
+            continue;
+        }
+        let Ok(file) = File::options().write(true).open(entry.path()) else { continue };
+        if file.try_lock().is_ok() {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Writes an 8- or 16-bit image as PNG, compressed for speed. Appears whole or not at all.

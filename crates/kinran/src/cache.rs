@@ -1,6 +1,6 @@
 //! `kinran cache`: what is kept of finished work, and room again.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use kinran_bake::cache::{Cache, Listed};
 use kinran_bake::manifest::size;
@@ -53,9 +53,12 @@ pub struct CacheReport {
 /// [`Error::Usage`] where there is no cache, [`Error::Image`] where it cannot be read or changed.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let library = LibraryArgs { cache: args.cache.clone(), ..LibraryArgs::default() };
-    let folder = cache_folder(&library, None, Path::new("."));
+    let folder = cache_folder(&library, None).ok_or_else(|| {
+        Error::Usage("there is no HOME to look for the cache in; name its folder with --cache".into())
+    })?;
+    let cache = Cache::open(&folder)?;
     // Whoever looks for a cache in the wrong place should not find an empty one.
-    if !folder.join("entries").is_dir() {
+    if !Cache::is_cache(&folder) {
         if args.cache.is_some() {
             return Err(Error::Usage(format!("{}: is no cache; name another folder", folder.display())));
         }
@@ -63,7 +66,6 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             CacheReport { folder: folder.clone(), bytes: 0, entries: vec![], removed: 0, removed_bytes: 0 };
         return console.result(&report, &format!("{}: nothing is kept yet\n", folder.display()));
     }
-    let cache = Cache::new(&folder);
     let limit = if args.clean { Some(0) } else { args.keep };
     let (removed, removed_bytes) = limit.map_or(Ok((0, 0)), |limit| cache.evict(limit))?;
     let entries = cache.list()?;

@@ -45,6 +45,13 @@ impl Console {
         }
     }
 
+    /// Tells what goes on, unless quiet.
+    pub fn note(&self, note: impl Display) {
+        if !self.quiet {
+            let _ = writeln!(stderr(), "{note}");
+        }
+    }
+
     /// Tells an error, in one line.
     pub fn error(&self, error: impl Display) {
         let line = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");

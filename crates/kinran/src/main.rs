@@ -24,7 +24,7 @@ use kinran::{
   kinran shaders --lang hlsl -o shaders/
 
 Angles are degrees. `kinran help COMMAND` tells all about a command.
-Exit codes: 0 done, 2 something in the input or the flags is wrong, 1 a defect of the program.")]
+Exit codes: 0 done, 2 something in the input or the flags is wrong, 1 a defect of the program, 130 interrupted.")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -67,6 +67,7 @@ enum Command {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let console = Console { quiet: cli.quiet, verbose: cli.verbose, json: cli.json, bars: None };
+    clean_up_when_interrupted();
     match start_threads(cli.threads).and_then(|()| run(&cli.command, &console)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -93,6 +94,28 @@ fn run(command: &Command, console: &Console) -> Result<(), Error> {
         Command::Skin(args) => skin_sheet::run(args, console),
         Command::SkinLut(args) => skin_lut::run(args, console),
     }
+}
+
+/// From now on Ctrl-C, and on Unix a polite kill, leave nothing unfinished behind. Where no handler can be had the next
+/// run removes it. Exit codes are as shells have them: 128 and the number of the signal.
+fn clean_up_when_interrupted() {
+    fn end(signal: i32) -> ! {
+        kinran_image::remove_unfinished();
+        std::process::exit(128 + signal)
+    }
+    #[cfg(unix)]
+    {
+        use signal_hook::consts::{SIGINT, SIGTERM};
+        if let Ok(mut signals) = signal_hook::iterator::Signals::new([SIGINT, SIGTERM]) {
+            std::thread::spawn(move || {
+                if let Some(signal) = signals.forever().next() {
+                    end(signal);
+                }
+            });
+        }
+    }
+    #[cfg(windows)]
+    let _ = ctrlc::set_handler(|| end(2));
 }
 
 fn start_threads(threads: Option<u16>) -> Result<(), Error> {

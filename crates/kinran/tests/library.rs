@@ -81,6 +81,37 @@ impl Library {
     }
 }
 
+/// A library's environment without a folder for what a user keeps.
+fn without_home(command: &mut Command) -> &mut Command {
+    ["HOME", "XDG_CACHE_HOME", "LOCALAPPDATA", "KINRAN_CACHE"]
+        .into_iter()
+        .fold(command, |command, name| command.env_remove(name))
+}
+
+/// Writes the square as `square.gltf` with `square.bin` and `square.png` beside it.
+fn gltf(folder: &Path) {
+    let glb = glb();
+    let length = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().unwrap()) as usize;
+    let json_length = length(12);
+    let mut json: Value = serde_json::from_slice(&glb[20..20 + json_length]).unwrap();
+    json["buffers"][0]["uri"] = "square.bin".into();
+    json["images"][0] = serde_json::json!({ "uri": "square.png" });
+    fs::create_dir_all(folder).unwrap();
+    fs::write(folder.join("square.gltf"), json.to_string()).unwrap();
+    fs::write(folder.join("square.bin"), &glb[20 + json_length + 8..]).unwrap();
+    fs::write(folder.join("square.png"), encode_png(&bumps()).unwrap()).unwrap();
+}
+
+/// Saves a file as editors do: in place, or by a new one that takes its name.
+fn save(path: &Path, bytes: &[u8], by_rename: bool) {
+    let beside = path.with_extension("saving");
+    let to = if by_rename { &beside } else { path };
+    fs::write(to, bytes).unwrap();
+    if by_rename {
+        fs::rename(beside, path).unwrap();
+    }
+}
+
 fn statuses(report: &Value) -> BTreeMap<String, String> {
     let entries = report["entries"].as_array().unwrap().iter();
     entries.map(|e| (e["name"].as_str().unwrap().into(), e["status"].as_str().unwrap().into())).collect()
@@ -286,7 +317,7 @@ fn a_cache_grows_without_limit() {
 
     // The limit of the manifest holds after the next run that bakes something.
     let entries = "[[aniso]]\ninput = \"materials/*\"\n[[mesh]]\ninput = \"*.glb\"\noutput = \"models\"\n";
-    library.describe(&format!("cache-limit = \"{}\"\n{entries}", bytes / 2));
+    library.describe(&format!("cache-limit = \"{} B\"\n{entries}", bytes / 2));
     fs::write(library.path("materials/cloth03/normal.png"), normals(7)).unwrap();
     library.statuses(&[]);
     assert!(kept() < 5, "{} entries are kept", kept());
@@ -533,8 +564,331 @@ fn a_saved_input_is_not_noticed() {
     std::thread::sleep(Duration::from_millis(700));
     fs::write(&input, normals(0)).unwrap();
     wait("the old map", || library.output() == first);
+    save(&input, &normals(6), true);
+    wait("a map that was saved by a rename", || library.output() != first);
+    save(&input, &normals(0), true);
+    wait("the old map again", || library.output() == first);
     let folder = library.path("materials/cloth01");
     fs::create_dir(&folder).unwrap();
     fs::write(folder.join("normal.png"), normals(3)).unwrap();
     wait("a new folder", || library.output().contains_key("cloth01/cloth01_normal.ktx2"));
+    fs::rename(&folder, library.path("materials/cloth02")).unwrap();
+    wait("a renamed folder", || library.output().contains_key("cloth02/cloth02_normal.ktx2"));
+    gltf(&library.path("props"));
+    let entries = "[[aniso]]\ninput = \"materials/*\"\n[[mesh]]\ninput = \"props/*.gltf\"\n";
+    save(&library.path("kinran.toml"), format!("cache = \"kept\"\n{entries}").as_bytes(), true);
+    let texture = "square/square_hammered_normal.ktx2";
+    wait("a new entry", || library.output().contains_key(texture));
+    let before = library.output();
+    save(&library.path("props/square.png"), &normals(4), false);
+    wait("a model's texture", || library.output()[texture] != before[texture]);
+}
+
+/// Inputs are hashed when a run begins and baked when their turn comes, which may be much later.
+#[test]
+fn a_map_that_is_saved_while_it_waits_is_kept_under_its_old_hash() {
+    let library = Library::new(5);
+    gltf(&library.path("props"));
+    library.describe(
+        "[[aniso]]\ninput = \"materials/*\"\n[[mesh]]\ninput = \"props/*.gltf\"\n[[detail]]\ninput = \"wall.png\"\n\
+         output = \"walls\"\nformat = \"bc1\"\nlayer = [{ tile = \"brick.png\", scale = 2 }]\n",
+    );
+    fs::write(library.path("wall.png"), normals(1)).unwrap();
+    let changing = [
+        ("materials/cloth04/normal.png", normals(4), normals(7)),
+        ("props/square.png", encode_png(&bumps()).unwrap(), normals(3)),
+        ("brick.png", normals(2), normals(6)),
+    ];
+    let all_as_first = || changing.iter().for_each(|(name, a, _)| fs::write(library.path(name), a).unwrap());
+    let forget = |folder: &str| fs::remove_dir_all(library.path(folder)).unwrap_or_default();
+    all_as_first();
+    assert!(all(&library.statuses(&[]), "baked"));
+    let wanted = library.output();
+
+    let mut others = 0;
+    for round in 0..8 {
+        forget("baked");
+        forget("kept");
+        let mut bake = library.command(&["--jobs", "1", "--quiet"]).stderr(Stdio::null()).spawn().unwrap();
+        while bake.try_wait().unwrap().is_none() {
+            for second in [true, false] {
+                for (name, a, b) in &changing {
+                    save(&library.path(name), if second { b } else { a }, round % 2 == 1);
+                }
+                std::thread::sleep(Duration::from_millis(3));
+            }
+        }
+        others += usize::from(library.output() != wanted);
+        all_as_first();
+        library.statuses(&[]);
+        assert_eq!(library.output(), wanted, "round {round}: the output is not what the inputs say");
+        forget("baked");
+        library.statuses(&[]);
+        assert_eq!(library.output(), wanted, "round {round}: the cache holds something else under a key");
+    }
+    assert!(others > 0, "no file was ever baked while it was another");
+    let left = tree(&library.path("baked/.kinran/work"));
+    assert!(left.keys().all(|name| name == "gate"), "copies of inputs were left: {:?}", left.keys());
+}
+
+/// Size and time of a file can be set back; the time of its last change of any kind cannot.
+#[cfg(unix)]
+#[test]
+fn an_edit_of_the_same_size_and_time_is_not_noticed() {
+    let library = Library::new(0);
+    let map = library.path("materials/felt/normal.tga");
+    fs::create_dir_all(map.parent().unwrap()).unwrap();
+    // Uncompressed, 8 x 8 texels of 24 bits, from the top left.
+    let tga = |blue: u8| {
+        let header = [0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 8, 0, 8, 0, 24, 0x20];
+        [&header[..], &[blue, 128, 128].repeat(64)].concat()
+    };
+    fs::write(&map, tga(255)).unwrap();
+    library.describe("[[aniso]]\ninput = \"materials/*\"\n");
+    library.statuses(&[]);
+    // Until then nobody trusts the time of a file.
+    std::thread::sleep(Duration::from_millis(2100));
+    assert!(all(&library.statuses(&[]), "up-to-date"));
+    let time = fs::metadata(&map).unwrap().modified().unwrap();
+    fs::write(&map, tga(250)).unwrap();
+    fs::File::options().write(true).open(&map).unwrap().set_modified(time).unwrap();
+    assert!(all(&library.statuses(&[]), "baked"));
+}
+
+#[test]
+fn cleaning_a_cache_takes_what_is_not_its_own() {
+    let library = Library::new(1);
+    let put = |name: &str| {
+        let path = library.path(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, "mine").unwrap();
+        path
+    };
+    let key = |digit: &str| digit.repeat(64);
+    // Folders that look like a cache from afar.
+    let foreign = [
+        put("blog/entries/first.md"),
+        put(&format!("photos/entries/{}/cat.jpg", key("a"))),
+        put("drive/work/gate"),
+        put("drive/notes.txt"),
+        put("tagged/CACHEDIR.TAG"),
+    ];
+    for folder in ["blog", "photos", "drive", "tagged"] {
+        let path = library.path(folder);
+        for args in [vec!["--clean"], vec!["--keep", "1 B"]] {
+            let all = [vec!["cache", "--cache", text(&path)], args].concat();
+            common::refused(&all, &[folder, "is neither empty nor a cache of kinran"]);
+        }
+        let output = library.command(&["--cache", text(&path)]).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && said.contains("name another folder"), "{folder}: {said}");
+    }
+    assert!(foreign.iter().all(|path| path.exists()));
+
+    // A cache into which somebody put other things; and one of an earlier version, which wrote no tag.
+    library.statuses(&[]);
+    let mine = [
+        put("kept/notes.txt"),
+        put("kept/entries/notes.txt"),
+        put(&format!("kept/entries/{}/cat.jpg", key("b"))),
+        put(&format!("kept/entries/{}/entry.json", &key("c")[1..])),
+        put("kept/work/mine/half.txt"),
+        put("kept/work/kinran-notes/half.txt"),
+        put("linked/entry.json"),
+    ];
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(library.path("linked"), library.path(&format!("kept/entries/{}", key("d"))))
+        .unwrap();
+    let cache = library.path("kept");
+    let cleaned = common::kinran_json(&["cache", "--cache", text(&cache), "--clean"]);
+    assert_eq!((cleaned["removed"].as_u64(), cleaned["entries"].as_array().unwrap().len()), (Some(2), 0));
+    fs::remove_dir_all(library.path("baked")).unwrap();
+    library.statuses(&[]);
+    assert!(mine.iter().all(|path| path.exists()), "{:?}", mine.iter().find(|path| !path.exists()));
+
+    let earlier = library.path("earlier");
+    library.statuses(&["--cache", text(&earlier), "-o", text(&library.path("other"))]);
+    fs::remove_file(earlier.join("CACHEDIR.TAG")).unwrap();
+    let cleaned = common::kinran_json(&["cache", "--cache", text(&earlier), "--clean"]);
+    assert_eq!(cleaned["removed"], 2);
+}
+
+#[test]
+fn a_library_bakes_its_own_results() {
+    let library = Library::new(1);
+    let model = fs::read(library.path("square.glb")).unwrap();
+    fs::write(library.path("wall.png"), normals(1)).unwrap();
+    fs::write(library.path("brick.png"), normals(2)).unwrap();
+    let entries = "[[mesh]]\ninput = \"**/*.glb\"\noutput = \"models\"\n[[aniso]]\ninput = \"*/*\"\n\
+                   [[detail]]\ninput = \"wall.png\"\nboard = true\nformat = \"bc1\"\n\
+                   layer = [{ tile = \"brick.png\" }]\n";
+    library.describe(entries);
+    let first = library.statuses(&[]);
+    let names: Vec<&str> = first.keys().map(String::as_str).collect();
+    assert_eq!(names, ["materials/cloth00", "square.glb", "wall.png"]);
+    let output = library.output();
+    for run in 0..2 {
+        let next = library.statuses(&[]);
+        assert!(next.len() == 3 && all(&next, "up-to-date"), "run {run}: {next:?}");
+        assert_eq!(library.output(), output, "run {run}");
+    }
+    // Nor those of another output or cache that lie about, also where nothing tells whose they were.
+    let next =
+        library.statuses(&["-o", text(&library.path("again")), "--cache", text(&library.path("store"))]);
+    assert_eq!(next.len(), 3, "{next:?}");
+    fs::remove_dir_all(library.path("baked/.kinran")).unwrap();
+    assert_eq!(library.statuses(&[]).len(), 3);
+    assert_eq!(fs::read(library.path("square.glb")).unwrap(), model);
+
+    // An output that holds the manifest cannot be left out as a whole.
+    let library = Library::new(1);
+    library.describe("output = \".\"\n[[mesh]]\ninput = \"**/*.glb\"\n");
+    let first = library.statuses(&[]);
+    assert!(library.path("square/square.glb").exists());
+    assert_eq!(library.statuses(&[]).keys().collect::<Vec<_>>(), first.keys().collect::<Vec<_>>());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_cache_that_cannot_be_used_stops_a_bake() {
+    let library = Library::new(2);
+    library.statuses(&[]);
+    let wanted = library.output();
+    let entries = "[[aniso]]\ninput = \"materials/*\"\n[[mesh]]\ninput = \"*.glb\"\noutput = \"models\"\n";
+    fs::write(library.path("kinran.toml"), entries).unwrap();
+    // No home, and a place where nobody can make a folder.
+    for args in [&[][..], &["--cache", "/proc/kinran"]] {
+        fs::remove_dir_all(library.path("baked")).unwrap();
+        let output = without_home(&mut library.command(args)).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(0), "{args:?}: {said}");
+        let warnings = said.lines().filter(|line| line.contains("kept")).count();
+        assert_eq!(warnings, 1, "{args:?}: {said}");
+        assert_eq!(library.output(), wanted, "{args:?}");
+    }
+    let output = without_home(Command::new(env!("CARGO_BIN_EXE_kinran")).arg("cache")).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// Another build of the same version has other bytes, and finds what this one has baked.
+#[cfg(target_os = "linux")]
+#[test]
+fn another_build_of_the_program_bakes_everything_again() {
+    let library = Library::new(1);
+    library.statuses(&[]);
+    let mut program = fs::read(env!("CARGO_BIN_EXE_kinran")).unwrap();
+    // What follows the program in its file is not read.
+    program.extend(b"another build");
+    let other = library.path("other_kinran");
+    fs::write(&other, program).unwrap();
+    fs::set_permissions(&other, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    let bake = || {
+        let manifest = library.path("kinran.toml");
+        let output = Command::new(&other).args(["bake", text(&manifest), "--json"]).output().unwrap();
+        statuses(&serde_json::from_slice(&output.stdout).unwrap())
+    };
+    assert!(all(&bake(), "up-to-date"));
+    fs::remove_dir_all(library.path("baked")).unwrap();
+    assert!(all(&bake(), "restored"));
+}
+
+/// BLAKE3 of all textures of a small library that the portable encoder makes, for `BYTES_VERSION` 1.
+const GOLDEN: &str = "6c44745c183447aff2ebbacbda9b1c261ac62e0442551e16dd1bbc099155a11a";
+
+/// Keys do not hold the program, only its version and `BYTES_VERSION`: other bytes under an old key would come out of
+/// old caches as they were.
+#[test]
+fn the_same_version_bakes_other_bytes_under_the_same_keys() {
+    let library = Library::new(2);
+    fs::write(library.path("wall.png"), normals(1)).unwrap();
+    fs::write(library.path("brick.png"), normals(2)).unwrap();
+    library.describe(
+        "[[aniso]]\ninput = \"materials/*\"\nencoder = \"portable\"\nform = \"both\"\n[[mesh]]\ninput = \"*.glb\"\n\
+         encoder = \"portable\"\n[[detail]]\ninput = \"wall.png\"\nformat = \"bc1\"\nlayer = [{ tile = \"brick.png\" }]\n\
+         [[skin]]\nsize = \"32x32\"\n",
+    );
+    library.statuses(&[]);
+    let mut hasher = blake3::Hasher::new();
+    for (name, bytes) in library.output() {
+        // Degrees in reports may differ in the last digit between systems.
+        if name.ends_with(".ktx2") {
+            hasher.update(name.as_bytes()).update(&bytes);
+        }
+    }
+    assert_eq!(
+        hasher.finalize().to_hex().as_str(),
+        GOLDEN,
+        "the bytes changed: raise BYTES_VERSION in crates/kinran/src/bake/library/inputs.rs and put the hash on the \
+         left here"
+    );
+}
+
+#[test]
+fn a_failure_hides_among_rows_of_success() {
+    let library = Library::new(3);
+    fs::write(library.path("materials/cloth01/normal.png"), "not an image").unwrap();
+    let output = library.command(&[]).output().unwrap();
+    let (out, err) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+    assert_eq!(out.lines().count(), 1, "{out}");
+    assert!(out.contains("3 baked") && out.contains("1 failed"), "{out}");
+    let last: Vec<&str> = err.lines().rev().take(2).collect();
+    assert!(
+        last[0].contains("1 of 4 entries failed") && last[1].starts_with("error: materials/cloth01: "),
+        "{err}"
+    );
+    // It names the file as the manifest does, not the copy that was baked.
+    assert!(last[1].contains("materials/cloth01/normal.png") && !last[1].contains("work"), "{err}");
+    fs::remove_dir_all(library.path("baked")).unwrap();
+    let output = library.command(&["--verbose"]).output().unwrap();
+    let out = String::from_utf8(output.stdout).unwrap();
+    assert!(out.contains("materials/cloth02") && out.lines().count() == 4, "{out}");
+}
+
+/// Names of temporary files in a folder.
+fn temporary(folder: &Path) -> Vec<String> {
+    let files = tree(folder).into_keys();
+    files.filter(|name| name.contains(".kinran-")).collect()
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_bake_leaves_temporary_files() {
+    let library = Library::new(1);
+    let (input, output) = (library.path("square.glb"), library.path("single"));
+    let bake = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinran"));
+        command.args(["bake", text(&input), "-o", text(&output), "--quiet"]);
+        command.stderr(Stdio::null()).spawn().unwrap()
+    };
+    let started = Instant::now();
+    bake().wait().unwrap();
+    let undisturbed = started.elapsed();
+    let mut interrupted = 0;
+    for i in 0..30 {
+        let mut process = bake();
+        std::thread::sleep(undisturbed.mul_f64(f64::from(i) / 30.0));
+        Command::new("kill").args(["-INT", &process.id().to_string()]).status().unwrap();
+        let code = process.wait().unwrap().code();
+        // Before it has said what to do at Ctrl-C there is nothing to remove.
+        assert!(matches!(code, Some(0 | 130) | None), "{code:?}");
+        interrupted += u32::from(code == Some(130));
+        assert_eq!(temporary(&output), Vec::<String>::new(), "after interruption {i}");
+    }
+    assert!(interrupted > 5, "{interrupted} of 30 were interrupted");
+
+    // What a dead process has left goes; what somebody is at work on, or has called so, stays.
+    let dead = output.join(".kinran-0123456789abcdef.part");
+    let living = output.join(".kinran-fedcba9876543210.part");
+    let mine = [".kinran-backup", ".kinran-AbCdEf", ".kinran-mine.part", ".kinran-0123456789abcdef"];
+    for path in mine.iter().map(|name| output.join(name)).chain([dead.clone(), living.clone()]) {
+        fs::write(path, "").unwrap();
+    }
+    let lock = fs::File::options().write(true).open(&living).unwrap();
+    lock.lock().unwrap();
+    bake().wait().unwrap();
+    assert!(!dead.exists() && living.exists());
+    assert!(mine.iter().all(|name| output.join(name).exists()));
+    drop(lock);
+    bake().wait().unwrap();
+    assert!(!living.exists());
 }

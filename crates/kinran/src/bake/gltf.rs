@@ -112,7 +112,7 @@ fn surfaces(
     if surfaces.is_empty() && !args.all_textures && !skin {
         report.warnings.push(format!(
             "{}: no material has a normal or an anisotropy map; nothing but --all-textures would bake anything",
-            args.input.display()
+            file_name(&args.input)
         ));
     }
     surfaces

@@ -1,20 +1,26 @@
 //! A library: what a `kinran.toml` lists, baked in parallel, each thing once.
 
-use std::collections::BTreeMap;
+mod inputs;
+mod ours;
+mod watch;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
-use kinran_bake::cache::{Cache, Entry, Key, StoredFile, WorkFolder, files_of, hash_file, relative};
-use kinran_bake::folder::scan;
-use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError, SettingValue};
+use kinran_bake::cache::{Cache, Entry, Key, StoredFile, WorkFolder, hash_file, relative};
+use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError};
 use kinran_bake::stamps::{Stamp, Stamps};
 use kinran_image::{write_atomically, write_atomically_in};
 use kinran_scene::Document;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use self::inputs::{Snapshot, Sources};
+use self::ours::Ours;
 use super::settings::{self, Flags};
 use super::{Args, Report, bake_folder, bake_gltf, file_name};
 use crate::detail::{SolveArgs, solve_target};
@@ -25,8 +31,11 @@ use crate::{Console, Error, Progress};
 /// Bytes that a cache may hold where nothing says otherwise; chosen by eye: a few hundred 4096² materials.
 pub const CACHE_LIMIT: u64 = 20 << 30;
 
-/// How often `--watch` looks.
-const WATCH_STEP: Duration = Duration::from_millis(300);
+/// How often an entry is begun anew because its inputs are saved while it is baked.
+const ATTEMPTS: usize = 3;
+
+/// How long an entry waits for files that were not there a moment ago.
+const RETRY_STEP: Duration = Duration::from_millis(100);
 
 /// How often what is known of the output is saved while baking.
 const SAVE_STEP: Duration = Duration::from_secs(2);
@@ -116,6 +125,8 @@ pub struct LibraryReport {
     pub left_over: Vec<PathBuf>,
     /// Those that `--prune` removed, or with `--dry-run` would remove.
     pub pruned: Vec<PathBuf>,
+    /// What is wrong beside the entries: with the cache, or with room on the disk.
+    pub warnings: Vec<String>,
 }
 
 impl LibraryReport {
@@ -123,11 +134,12 @@ impl LibraryReport {
         self.entries.iter().filter(|entry| entry.status == status).count()
     }
 
-    /// A row for each entry that was not up to date, and the counts.
-    fn text(&self) -> String {
-        let changed: Vec<&EntryReport> =
-            self.entries.iter().filter(|entry| entry.status != Status::UpToDate).collect();
-        let rows = changed.iter().map(|entry| {
+    /// The counts; before them, with `verbose` and where nothing was done yet, a row for each entry that was not up to
+    /// date. Entries that failed are told after it.
+    fn text(&self, verbose: bool) -> String {
+        let planned = |entry: &EntryReport| matches!(entry.status, Status::WouldBake | Status::WouldRestore);
+        let shown = |entry: &&EntryReport| planned(entry) || (verbose && entry.status != Status::Failed);
+        let rows = self.entries.iter().filter(shown).map(|entry| {
             let bytes: u64 = entry.files.iter().map(|file| file.bytes).sum();
             let size = match entry.files.len() {
                 0 => String::new(),
@@ -174,10 +186,16 @@ struct Standing {
 /// A library on its way.
 struct Library {
     output: PathBuf,
-    cache: Cache,
+    cache: Option<Cache>,
+    /// Why nothing can be kept in the cache; told once.
+    trouble: OnceLock<String>,
     stamps: Stamps,
     standing: Mutex<BTreeMap<PathBuf, Standing>>,
+    /// `standing` is not saved yet.
+    is_news: AtomicBool,
     saved: Mutex<Instant>,
+    /// Folders of files that entries are made from.
+    folders: Mutex<BTreeSet<PathBuf>>,
 }
 
 /// Bakes what a manifest lists; with `--watch` again and again.
@@ -187,26 +205,14 @@ struct Library {
 /// others are done.
 pub fn bake_library(args: &Args, console: &Console) -> Result<(), Error> {
     settings::refuse_others(args)?;
-    let mut failed = Failures::new();
-    if !args.library.watch {
-        return build(args, console, &mut failed)?.finish(console);
+    if args.library.watch {
+        return watch::watch(args, console);
     }
-    let mut last = String::new();
-    loop {
-        let result = build(args, console, &mut failed);
-        let said = match &result {
-            Ok(built) => serde_json::to_string(&built.report).unwrap_or_default(),
-            Err(error) => error.to_string(),
-        };
-        let news = !matches!(&result, Ok(built) if !built.is_news());
-        if news && said != last {
-            match result {
-                Ok(built) => console.result(&built.report, &built.report.text())?,
-                Err(error) => console.failure(&error),
-            }
-        }
-        last = said;
-        std::thread::sleep(WATCH_STEP);
+    let built = build(args, console, &mut Failures::new())?;
+    built.tell(console)?;
+    match built.report.count(Status::Failed) {
+        0 => Ok(()),
+        failed => Err(Error::Entries { failed, of: built.report.entries.len() }),
     }
 }
 
@@ -215,6 +221,10 @@ type Failures = BTreeMap<PathBuf, (Option<Key>, String)>;
 
 struct Built {
     report: LibraryReport,
+    /// Entries that failed, and why, where that was not told before.
+    failed: Vec<String>,
+    /// Where inputs are, or were.
+    folders: BTreeSet<PathBuf>,
 }
 
 impl Built {
@@ -223,12 +233,17 @@ impl Built {
         self.report.count(Status::UpToDate) < self.report.entries.len()
     }
 
-    fn finish(self, console: &Console) -> Result<(), Error> {
-        console.result(&self.report, &self.report.text())?;
-        match self.report.count(Status::Failed) {
-            0 => Ok(()),
-            failed => Err(Error::Entries { failed, of: self.report.entries.len() }),
+    /// Tells what was done, what is doubtful, and last what failed.
+    fn tell(&self, console: &Console) -> Result<(), Error> {
+        for entry in &self.report.entries {
+            for warning in &entry.warnings {
+                console.warn(format!("{}: {warning}", entry.name));
+            }
         }
+        self.report.warnings.iter().for_each(|warning| console.warn(warning));
+        console.result(&self.report, &self.report.text(console.verbose))?;
+        self.failed.iter().for_each(|failure| console.error(failure));
+        Ok(())
     }
 }
 
@@ -240,7 +255,10 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
     if !args.dry_run {
         crate::outputs::check_folder(&output)?;
     }
-    for job in manifest.jobs() {
+    let cache = cache_folder(&args.library, manifest.cache.as_deref());
+    let library = Library::new(output, cache.as_deref())?;
+    let ours = Ours::new(&args.input, &library.output, cache.as_deref(), library.written().into_iter());
+    for job in manifest.jobs(&|path| ours.is(path)) {
         match job {
             Ok(job) => {
                 let flags = settings::flags(&manifest, &job)?;
@@ -250,8 +268,6 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
             Err(error) => entries.push(EntryReport::missing(&error)),
         }
     }
-    let cache_path = cache_folder(&args.library, manifest.cache.as_deref(), &output);
-    let library = Library::new(output, &cache_path);
 
     // Look at everything first: what is up to date costs no more than that.
     let stage = console.progress().stage("checking", work.len() as u64);
@@ -278,13 +294,15 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
     }
     if args.dry_run {
         for (at, key, ..) in &todo {
-            let cached = library.cache.get(key).is_some();
+            let cached = library.cache.as_ref().is_some_and(|cache| cache.get(key).is_some());
             entries[*at].status = if cached { Status::WouldRestore } else { Status::WouldBake };
         }
         let gone = library.gone(&entries);
         let (left_over, pruned) = if args.library.prune { (Vec::new(), gone) } else { (gone, Vec::new()) };
-        let report = LibraryReport { output: library.output, entries, evicted: 0, left_over, pruned };
-        return Ok(Built { report });
+        return Ok(library.built(entries, 0, left_over, pruned, Vec::new()));
+    }
+    if !todo.is_empty() {
+        library.prepare_cache();
     }
 
     // Bake the rest, some at a time. Threads of their own and not tasks of the pool: a thread of the pool that
@@ -292,25 +310,27 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
     let bars = console.progress().grouped();
     let stage = bars.stage("baking", todo.len() as u64);
     let next = AtomicUsize::new(0);
-    let done: Mutex<Vec<(usize, EntryReport)>> = Mutex::new(Vec::new());
+    let done: Mutex<Vec<(usize, EntryReport, Key)>> = Mutex::new(Vec::new());
     let threads = args.library.jobs.map_or_else(rayon::current_num_threads, usize::from).min(todo.len());
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
                 while let Some((at, key, job, flags)) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let mut entry = EntryReport::new(job);
-                    match library.make(job, key, flags, &bars, &mut entry) {
+                    let (mut entry, mut key) = (EntryReport::new(job), *key);
+                    match library.make(job, &mut key, flags, &bars, &mut entry) {
                         Ok(status) => entry.status = status,
                         Err(error) => entry.fail(error.to_string()),
                     }
-                    lock(&done).push((*at, entry));
+                    lock(&done).push((*at, entry, key));
                     stage.add(1);
                 }
             });
         }
     });
     drop(stage);
-    for (at, entry) in done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
+    let mut keys: BTreeMap<PathBuf, Key> = BTreeMap::new();
+    for (at, entry, key) in done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
+        keys.insert(entry.folder.clone(), key);
         entries[at] = entry;
     }
     let gone = library.gone(&entries);
@@ -318,23 +338,21 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
     library.prune(&pruned, console)?;
     library.save()?;
     let limit = manifest.cache_limit.unwrap_or(CACHE_LIMIT);
-    let evicted = if todo.is_empty() { 0 } else { library.cache.evict(limit)?.0 };
+    let evicted = if todo.is_empty() { 0 } else { library.evict(limit) };
 
     // Tell what went wrong once.
     failures.retain(|folder, _| entries.iter().any(|e| e.folder == *folder && e.status == Status::Failed));
+    let mut failed = Vec::new();
     for entry in &entries {
-        for warning in &entry.warnings {
-            console.warn(format!("{}: {warning}", entry.name));
-        }
         let Some(error) = &entry.error else { continue };
-        let key = todo.iter().find(|(_, _, job, _)| job.folder == entry.folder).map(|(_, key, ..)| *key);
-        let known = failures.get(&entry.folder).is_some_and(|(_, why)| why == error);
-        if !known {
-            console.error(format!("{}: {error}", entry.name));
-            failures.insert(entry.folder.clone(), (key, error.clone()));
+        if failures.get(&entry.folder).is_none_or(|(_, why)| why != error) {
+            failed.push(format!("{}: {error}", entry.name));
         }
+        // Without a key it is looked at again and again, until it has one.
+        let key = keys.get(&entry.folder).or_else(|| failures.get(&entry.folder)?.0.as_ref()).copied();
+        failures.insert(entry.folder.clone(), (key, error.clone()));
     }
-    Ok(Built { report: LibraryReport { output: library.output, entries, evicted, left_over, pruned } })
+    Ok(library.built(entries, evicted, left_over, pruned, failed))
 }
 
 impl EntryReport {
@@ -370,9 +388,8 @@ impl EntryReport {
     }
 }
 
-/// `--cache`, `KINRAN_CACHE`, the manifest's, or the user's folder for such things; beside the output where
-/// there is no user.
-pub fn cache_folder(args: &LibraryArgs, manifest: Option<&Path>, output: &Path) -> PathBuf {
+/// `--cache`, `KINRAN_CACHE`, the manifest's, or the user's folder for such things; nothing where there is no user.
+pub fn cache_folder(args: &LibraryArgs, manifest: Option<&Path>) -> Option<PathBuf> {
     let variable = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     (args.cache.clone())
         .or_else(|| variable("KINRAN_CACHE"))
@@ -380,79 +397,111 @@ pub fn cache_folder(args: &LibraryArgs, manifest: Option<&Path>, output: &Path) 
         .or_else(|| Some(variable("XDG_CACHE_HOME")?.join("kinran")))
         .or_else(|| Some(variable("LOCALAPPDATA")?.join("kinran").join("cache")))
         .or_else(|| Some(variable("HOME")?.join(".cache").join("kinran")))
-        .unwrap_or_else(|| output.join(STATE).join("cache"))
 }
 
 /// The folder in the output with what is known of it.
 const STATE: &str = ".kinran";
 
+/// Where an entry's files are.
+enum Source<'a> {
+    Cache(&'a Cache, &'a Key),
+    /// A folder of work, which they may leave.
+    Work(&'a Path),
+}
+
 impl Library {
-    fn new(output: PathBuf, cache: &Path) -> Self {
+    fn new(output: PathBuf, cache: Option<&Path>) -> Result<Self, Error> {
         let state = output.join(STATE);
         let standing = std::fs::read(state.join("standing.json")).ok();
-        let standing = standing.and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
-        Library {
-            cache: Cache::new(cache),
+        let standing = standing.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+        let mut standing: BTreeMap<PathBuf, Standing> = standing.unwrap_or_default();
+        // Files are removed by what stands there: none outside of the output.
+        standing.retain(|folder, standing| {
+            let names = standing.files.iter().map(|(file, _)| file.name.as_str());
+            folder.to_str().into_iter().chain(names).all(|name| relative(name).is_some())
+        });
+        Ok(Library {
+            cache: cache.map(Cache::open).transpose()?,
+            trouble: OnceLock::new(),
             stamps: Stamps::load(&state.join("inputs.json")),
             standing: Mutex::new(standing),
+            is_news: AtomicBool::new(false),
             saved: Mutex::new(Instant::now()),
+            folders: Mutex::default(),
             output,
-        }
+        })
     }
 
-    /// Hash of all that an entry's files depend on.
+    fn state(&self) -> PathBuf {
+        self.output.join(STATE)
+    }
+
+    fn built(
+        self,
+        entries: Vec<EntryReport>,
+        evicted: usize,
+        left_over: Vec<PathBuf>,
+        pruned: Vec<PathBuf>,
+        failed: Vec<String>,
+    ) -> Built {
+        let warnings = self.trouble.into_inner().into_iter().collect();
+        let output = self.output;
+        let report = LibraryReport { output, entries, evicted, left_over, pruned, warnings };
+        let folders = self.folders.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        Built { report, failed, folders }
+    }
+
+    /// The files that earlier runs wrote.
+    fn written(&self) -> Vec<PathBuf> {
+        let standing = lock(&self.standing);
+        let files = |(folder, standing): (&PathBuf, &Standing)| {
+            let folder = self.output.join(folder);
+            standing.files.iter().map(|(file, _)| folder.join(&file.name)).collect::<Vec<_>>()
+        };
+        standing.iter().flat_map(files).collect()
+    }
+
+    /// Hash of all that an entry's files depend on, as they are now.
     fn key(&self, job: &Job, flags: &Flags) -> Result<Key, Error> {
-        let mut parts: Vec<String> = vec![env!("CARGO_PKG_VERSION").into(), self.program()?, processor()];
-        parts.push(job.kind.name().into());
-        parts.extend(job.settings.iter().map(|setting| match &setting.value {
-            SettingValue::Switch(on) => format!("{} {on}", setting.name),
-            SettingValue::Texts(texts) => {
-                let texts: Vec<&str> = texts.iter().map(|(text, _)| text.as_str()).collect();
-                format!("{} {texts:?}", setting.name)
-            }
-        }));
-        match (job.kind, flags) {
-            (Kind::Aniso, Flags::Bake(flags)) => {
-                let folder = scan(&job.input, &flags.hints())?;
-                parts.push(serde_json::to_string(&folder.rows).map_err(|e| Error::Internal(e.to_string()))?);
-                for (role, path) in folder.materials.iter().flat_map(|material| &material.files) {
-                    parts.push(format!("{} {} {}", role.name(), file_name(path), self.stamps.hash(path)?));
-                }
-            }
-            (_, Flags::Detail(flags)) => {
-                let layers = flags.layer.iter().flat_map(|layer| [Some(&layer.tile), layer.mask.as_ref()]);
-                let model = flags.model.as_ref().map(|model| self.model_files(model)).transpose()?;
-                let model = model.unwrap_or_default();
-                for path in std::iter::once(&job.input).chain(layers.flatten()).chain(&model) {
-                    parts.push(format!("{} {}", file_name(path), self.stamps.hash(path)?));
-                }
-            }
-            (_, Flags::Skin(flags)) => {
-                if let Some(path) = &flags.profile {
-                    parts.push(format!("{} {}", file_name(path), self.stamps.hash(path)?));
-                }
-            }
-            (_, Flags::Bake(_)) => {
-                for path in self.model_files(&job.input)? {
-                    parts.push(format!("{} {}", file_name(&path), self.stamps.hash(&path)?));
-                }
-            }
+        let sources = Sources::of(job, flags, &|model| {
+            self.stamps.refers_to(model, |bytes| -> Result<_, Error> {
+                Ok(Document::from_bytes(model, bytes)?.files())
+            })
+        })?;
+        let folders = sources.files.iter().filter_map(|(_, file)| file.parent()).map(Path::to_path_buf);
+        lock(&self.folders).extend(folders);
+        sources.key(&|path| Ok(self.stamps.hash(path)?))
+    }
+
+    /// Finds out before anything is baked whether it can be kept.
+    fn prepare_cache(&self) {
+        match &self.cache {
+            Some(cache) => self.complain(cache.prepare().err()),
+            None => drop(self.trouble.set(
+                "there is no HOME to keep finished work in, so that nothing is kept; name a folder with --cache".into(),
+            )),
         }
-        Ok(Key::new(parts.iter().map(String::as_bytes)))
     }
 
-    /// A model and the files that it refers to.
-    fn model_files(&self, model: &Path) -> Result<Vec<PathBuf>, Error> {
-        let files =
-            self.stamps.refers_to(model, || -> Result<_, Error> { Ok(Document::open(model)?.files()) })?;
-        Ok(std::iter::once(model.to_path_buf()).chain(files).collect())
+    /// A cache that fails is no reason not to bake.
+    fn complain(&self, error: Option<kinran_image::Error>) {
+        if let Some(error) = error {
+            // The first complaint is enough.
+            let _ = self
+                .trouble
+                .set(format!("what is baked is not kept, since the cache cannot be used: {error}"));
+        }
     }
 
-    /// The program itself: another build may bake other bytes under the same version.
-    fn program(&self) -> Result<String, Error> {
-        match std::env::current_exe() {
-            Ok(path) => Ok(self.stamps.hash(&path)?),
-            Err(_) => Ok(String::new()),
+    /// Makes room in the cache; tells how many entries went.
+    fn evict(&self, limit: u64) -> usize {
+        match self.cache.as_ref().filter(|_| self.trouble.get().is_none()).map(|cache| cache.evict(limit)) {
+            None => 0,
+            Some(Ok((count, _))) => count,
+            Some(Err(error)) => {
+                self.complain(Some(error));
+                0
+            }
         }
     }
 
@@ -466,75 +515,109 @@ impl Library {
         whole.then(|| standing.files.into_iter().map(|(file, _)| file).collect())
     }
 
-    /// Brings an entry's files to the output, from the cache or by baking them into it first.
+    /// Brings an entry's files to the output, from the cache or by baking them. `key` becomes that of what was baked, where
+    /// the inputs have changed meanwhile.
     fn make(
         &self,
         job: &Job,
-        key: &Key,
+        key: &mut Key,
         flags: &Flags,
         bars: &Progress,
         report: &mut EntryReport,
     ) -> Result<Status, Error> {
-        if let Some(entry) = self.cache.get(key)
-            && let Some(copied) = self.place(job, key, &entry, report)?
-        {
-            return Ok(if copied == 0 { Status::UpToDate } else { Status::Restored });
+        if let Some(status) = self.restore(job, key, report)? {
+            return Ok(status);
         }
-        // What is damaged is in the way.
-        self.cache.remove(key)?;
-        let work = self.cache.work_folder()?;
-        let output = files_of(&work);
-        let silent = Console { quiet: true, bars: Some(bars.of(&job.name)), ..Console::default() };
-        let reports = match flags {
-            Flags::Bake(flags) => {
-                let flags = Args { input: job.input.clone(), output: Some(output), ..(**flags).clone() };
-                match job.kind {
-                    Kind::Mesh => vec![bake_gltf(&flags, &silent)?],
-                    _ => bake_folder(&flags, &silent)?,
+        for attempt in 1.. {
+            let is_last = attempt == ATTEMPTS;
+            let snapshot = match Snapshot::take(&self.state(), job, flags) {
+                Err(error) if is_last => return Err(error),
+                Err(_) => {
+                    std::thread::sleep(RETRY_STEP);
+                    continue;
                 }
+                Ok(snapshot) => snapshot,
+            };
+            if std::mem::replace(key, snapshot.key) != snapshot.key
+                && let Some(status) = self.restore(job, key, report)?
+            {
+                return Ok(status);
             }
-            Flags::Detail(flags) => {
-                let flags = SolveArgs { target: job.input.clone(), output, ..(**flags).clone() };
-                solve_target(&flags, &silent)?;
-                Vec::new()
+            match self.bake(job, &snapshot, bars, report) {
+                // What cannot be baked may have been a file half saved.
+                Err(_) if !is_last && self.key(job, flags).ok() != Some(*key) => {}
+                result => return result,
             }
-            Flags::Skin(flags) => {
-                skin_lut::run(&skin_lut::Args { output, ..(**flags).clone() }, &silent)?;
-                Vec::new()
-            }
-        };
-        let warnings: Vec<&str> =
-            reports.iter().flat_map(|r: &Report| &r.warnings).map(String::as_str).collect();
-        let entry = self.cache.publish(key, work, &job.name, serde_json::json!(warnings))?;
-        if self.place(job, key, &entry, report)?.is_none() {
-            let reason = std::io::Error::other("its files vanished while they were copied out; try again");
-            return Err(kinran_image::Error::io(self.cache.root(), reason).into());
         }
+        unreachable!("the last attempt returns")
+    }
+
+    /// Copies an entry's files from the cache, if it has them.
+    fn restore(&self, job: &Job, key: &Key, report: &mut EntryReport) -> Result<Option<Status>, Error> {
+        let Some(cache) = &self.cache else { return Ok(None) };
+        let Some(entry) = cache.get(key) else { return Ok(None) };
+        match self.place(job, key, &entry, Source::Cache(cache, key), report)? {
+            Some(0) => Ok(Some(Status::UpToDate)),
+            Some(_) => Ok(Some(Status::Restored)),
+            None => {
+                // What is damaged is in the way.
+                self.complain(cache.remove(key).err());
+                Ok(None)
+            }
+        }
+    }
+
+    /// Bakes an entry, keeps it, and moves its files to the output.
+    fn bake(
+        &self,
+        job: &Job,
+        snapshot: &Snapshot,
+        bars: &Progress,
+        report: &mut EntryReport,
+    ) -> Result<Status, Error> {
+        let work = WorkFolder::new(&self.state())?;
+        let warnings = bake_into(work.path(), job, snapshot, bars)?;
+        let entry = Entry::of(work.path(), &job.name, serde_json::json!(warnings))?;
+        if let Some(cache) = self.cache.as_ref().filter(|_| self.trouble.get().is_none()) {
+            self.complain(cache.publish(&snapshot.key, work.path(), &entry).err());
+        }
+        self.place(job, &snapshot.key, &entry, Source::Work(work.path()), report)?;
         Ok(Status::Baked)
     }
 
-    /// Copies an entry's files to the output, those that are not there yet, and tells how many those were; nothing
+    /// Brings an entry's files to the output, those that are not there yet, and tells how many those were; nothing
     /// where the cache has lost one.
     fn place(
         &self,
         job: &Job,
         key: &Key,
         entry: &Entry,
+        source: Source,
         report: &mut EntryReport,
     ) -> Result<Option<usize>, Error> {
         let folder = self.output.join(&job.folder);
-        let scratch = WorkFolder::new(&self.output.join(STATE))?;
+        let scratch = WorkFolder::new(&self.state())?;
         let (mut files, mut copied) = (Vec::new(), 0);
         for file in &entry.files {
             let Some(name) = relative(&file.name) else { return Ok(None) };
-            let path = folder.join(name);
+            let path = folder.join(&name);
             if !is_already(&path, file) {
-                let Some(bytes) = self.cache.read(key, file) else { return Ok(None) };
+                let bytes = match source {
+                    Source::Cache(cache, key) => match cache.read(key, file) {
+                        Some(bytes) => Some(bytes),
+                        None => return Ok(None),
+                    },
+                    Source::Work(_) => None,
+                };
                 refuse_input(job, &path)?;
                 if let Some(parent) = path.parent() {
                     std::fs::create_dir_all(parent).map_err(|e| kinran_image::Error::io(parent, e))?;
                 }
-                write_atomically_in(scratch.path(), &path, &bytes)?;
+                match (&source, bytes) {
+                    (Source::Work(work), _) => move_file(&work.join(&name), &path)?,
+                    (_, Some(bytes)) => write_over(scratch.path(), &path, &bytes)?,
+                    (_, None) => return Ok(None),
+                }
                 copied += 1;
             }
             if let Some(stamp) = Stamp::of(&path) {
@@ -547,10 +630,11 @@ impl Library {
         // What an earlier run left there under other names is of no use.
         let standing = Standing { key: key.hex(), files };
         let old = lock(&self.standing).insert(job.folder.clone(), standing);
+        self.is_news.store(true, Ordering::Relaxed);
         for (file, stamp) in old.into_iter().flat_map(|old| old.files) {
             let path = folder.join(&file.name);
             let kept = entry.files.iter().any(|new| new.name == file.name);
-            if !kept && Stamp::of(&path).as_ref() == Some(&stamp) {
+            if !kept && self.is_mine(&path, &file, &stamp) {
                 std::fs::remove_file(&path).map_err(|e| kinran_image::Error::io(&path, e))?;
             }
         }
@@ -558,6 +642,14 @@ impl Library {
             self.save()?;
         }
         Ok(Some(copied))
+    }
+
+    /// Whether a file is the one that this program wrote there: it is no link, no link leads to it, and it looks as it did
+    /// or holds what it held.
+    fn is_mine(&self, path: &Path, file: &StoredFile, stamp: &Stamp) -> bool {
+        let mut way = path.ancestors().take_while(|part| *part != self.output);
+        let no_link = way.all(|part| !part.is_symlink());
+        no_link && (Stamp::of(path).as_ref() == Some(stamp) || is_already(path, file))
     }
 
     /// Folders of entries that no input stands for any more. While an input is missing nothing is said: its folder has
@@ -578,16 +670,16 @@ impl Library {
             let path = self.output.join(folder);
             let known = lock(&self.standing).remove(folder).unwrap_or_default();
             for (file, stamp) in known.files {
-                let Some(file) = relative(&file.name).map(|name| path.join(name)) else { continue };
-                match Stamp::of(&file) {
-                    None => {}
-                    Some(now) if now == stamp => {
-                        std::fs::remove_file(&file).map_err(|e| kinran_image::Error::io(&file, e))?;
-                    }
-                    Some(_) => console.warn(format!("{}: was changed and stays", file.display())),
+                let written = path.join(&file.name);
+                if self.is_mine(&written, &file, &stamp) {
+                    std::fs::remove_file(&written).map_err(|e| kinran_image::Error::io(&written, e))?;
+                } else if written.exists() {
+                    console.warn(format!("{}: was changed and stays", written.display()));
                 }
             }
+            self.is_news.store(true, Ordering::Relaxed);
             let inside = path.ancestors().take_while(|inside| *inside != self.output);
+            // A folder that holds anything stays.
             inside.take_while(|inside| std::fs::remove_dir(inside).is_ok()).for_each(drop);
         }
         Ok(())
@@ -595,27 +687,63 @@ impl Library {
 
     /// Saves what is known of inputs and output, so that the next run need not look at their bytes.
     fn save(&self) -> Result<(), Error> {
-        let state = self.output.join(STATE);
+        let state = self.state();
         std::fs::create_dir_all(&state).map_err(|e| kinran_image::Error::io(&state, e))?;
         *lock(&self.saved) = Instant::now();
         self.stamps.save(&state.join("inputs.json"))?;
-        let json = serde_json::to_vec(&*lock(&self.standing)).map_err(|e| Error::Internal(e.to_string()))?;
-        Ok(write_atomically(&state.join("standing.json"), &json)?)
+        if self.is_news.swap(false, Ordering::Relaxed) {
+            let json =
+                serde_json::to_vec(&*lock(&self.standing)).map_err(|e| Error::Internal(e.to_string()))?;
+            write_atomically(&state.join("standing.json"), &json)?;
+        }
+        Ok(())
     }
 }
 
-/// The instruction sets that Intel's block encoder chooses among; its bytes differ.
-fn processor() -> String {
-    #[cfg(target_arch = "x86_64")]
-    let sets = [
-        std::arch::is_x86_feature_detected!("sse4.1"),
-        std::arch::is_x86_feature_detected!("avx"),
-        std::arch::is_x86_feature_detected!("avx2"),
-        std::arch::is_x86_feature_detected!("avx512f"),
-    ];
-    #[cfg(not(target_arch = "x86_64"))]
-    let sets = [(); 0];
-    format!("{} {sets:?}", std::env::consts::ARCH)
+/// Bakes a copy into a folder; gives the warnings. Errors and warnings are about the originals.
+fn bake_into(output: &Path, job: &Job, snapshot: &Snapshot, bars: &Progress) -> Result<Vec<String>, Error> {
+    let silent = Console { quiet: true, bars: Some(bars.of(&job.name)), ..Console::default() };
+    let (input, output) = (snapshot.job.input.clone(), output.to_path_buf());
+    let reports = match &snapshot.flags {
+        Flags::Bake(flags) => {
+            let flags = Args { input, output: Some(output), ..(**flags).clone() };
+            match job.kind {
+                Kind::Mesh => bake_gltf(&flags, &silent).map(|report| vec![report]),
+                _ => bake_folder(&flags, &silent),
+            }
+        }
+        Flags::Detail(flags) => {
+            let flags = SolveArgs { target: input, output, ..(**flags).clone() };
+            solve_target(&flags, &silent).map(|_| Vec::new())
+        }
+        Flags::Skin(flags) => {
+            skin_lut::run(&skin_lut::Args { output, ..(**flags).clone() }, &silent).map(|()| Vec::new())
+        }
+    };
+    let reports: Vec<Report> = reports.map_err(|e| snapshot.as_about_originals(e))?;
+    let warnings = reports.iter().flat_map(|report| &report.warnings);
+    Ok(warnings.map(|warning| snapshot.original_names(warning)).collect())
+}
+
+/// Moves a finished file, also to another disk.
+fn move_file(from: &Path, to: &Path) -> Result<(), Error> {
+    match std::fs::rename(from, to) {
+        Err(e) if e.kind() == ErrorKind::CrossesDevices => {
+            let bytes = std::fs::read(from).map_err(|e| kinran_image::Error::io(from, e))?;
+            Ok(write_atomically(to, &bytes)?)
+        }
+        moved => Ok(moved.map_err(|e| kinran_image::Error::io(to, e))?),
+    }
+}
+
+/// Writes a file by way of a scratch folder, also to another disk.
+fn write_over(scratch: &Path, path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    match write_atomically_in(scratch, path, bytes) {
+        Err(kinran_image::Error::Io { source, .. }) if source.kind() == ErrorKind::CrossesDevices => {
+            Ok(write_atomically(path, bytes)?)
+        }
+        written => Ok(written?),
+    }
 }
 
 fn is_already(path: &Path, file: &StoredFile) -> bool {

@@ -1,15 +1,18 @@
 //! Flags of `kinran bake`, `kinran detail solve` and `kinran skin-lut` as a manifest gives them.
 
+use std::path::{Path, PathBuf};
+
 use clap::{ArgAction, CommandFactory, Parser};
 use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError, Setting, SettingValue};
+use kinran_image::{Encoding, Role};
 
 use super::Args;
 use crate::Error;
-use crate::detail::SolveArgs;
+use crate::detail::{BlockFormat, SolveArgs, default_format};
 use crate::skin_lut;
 
 /// Flags that say what a run does, not how an entry is baked.
-const OF_THE_RUN: [&str; 6] = ["output", "watch", "jobs", "cache", "dry-run", "help"];
+const OF_THE_RUN: [&str; 7] = ["output", "watch", "jobs", "prune", "cache", "dry-run", "help"];
 
 #[derive(Parser)]
 #[command(name = "bake", no_binary_name = true)]
@@ -41,6 +44,43 @@ pub(super) enum Flags {
     Detail(Box<SolveArgs>),
     /// [`Kind::Skin`].
     Skin(Box<skin_lut::Args>),
+}
+
+impl Flags {
+    /// The flags, with other paths for the files that they name.
+    pub(super) fn with_files(&self, file: &mut dyn FnMut(&Path) -> PathBuf) -> Flags {
+        let mut flags = self.clone();
+        match &mut flags {
+            Flags::Bake(args) => args.map.iter_mut().for_each(|(_, path)| *path = file(path)),
+            Flags::Detail(args) => {
+                for layer in &mut args.layer {
+                    layer.tile = file(&layer.tile);
+                    layer.mask = layer.mask.as_deref().map(&mut *file);
+                }
+                args.model = args.model.as_deref().map(file);
+            }
+            Flags::Skin(args) => args.profile = args.profile.as_deref().map(file),
+        }
+        flags
+    }
+
+    /// How textures may be compressed.
+    pub(super) fn encodings(&self) -> Vec<Encoding> {
+        match self {
+            Flags::Bake(args) => vec![
+                args.encoding(Role::Normal, args.normal_format),
+                args.encoding(Role::Aniso, args.aniso_format),
+                args.encoding(Role::Color, args.color_format),
+            ],
+            Flags::Detail(args) => {
+                let format = args.format.unwrap_or_else(|| default_format(args.kind.into()));
+                let masks = args.layer.iter().any(|layer| layer.mask.is_some()).then_some(BlockFormat::Bc7);
+                let formats = [Some(format), args.tile_format, masks].into_iter().flatten();
+                formats.map(BlockFormat::encoding).collect()
+            }
+            Flags::Skin(_) => Vec::new(),
+        }
+    }
 }
 
 /// Refuses flags that a manifest sets for its entries.
@@ -85,10 +125,14 @@ pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestErr
     }
     if job.kind == Kind::Skin {
         let mut args = SkinFlags::try_parse_from(all).map_err(wrong)?.args;
-        args.profile = args.profile.as_ref().map(|profile| manifest.beside(profile));
+        // An input's path starts where the program was started already.
+        if job.input.as_os_str().is_empty() {
+            args.profile = args.profile.as_ref().map(|profile| manifest.beside(profile));
+        }
         return Ok(Flags::Skin(Box::new(args)));
     }
     let mut args = BakeFlags::try_parse_from(all).map_err(wrong)?.args;
+    super::check_formats(&args).map_err(|e| manifest.error(&job.place, e.to_string()))?;
     for path in args.map.iter_mut().map(|(_, path)| path).chain(&mut args.ignore) {
         if !job.input.join(&path).exists() {
             *path = manifest.beside(&*path);
