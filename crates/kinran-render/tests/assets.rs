@@ -65,6 +65,7 @@ fn front(scene: &RenderScene, centre: Vec3, unit: f32) -> Film {
         env_samples: 4,
         shadows: false,
         background: Background::Color(Vec3::ZERO),
+        ..Settings::default()
     };
     render(scene, &camera, &settings, &|_, _| {}).unwrap()
 }

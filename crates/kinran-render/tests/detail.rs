@@ -280,6 +280,7 @@ mod realtime {
                 env_samples: 0,
                 shadows: false,
                 background,
+                ..Settings::default()
             };
             let wanted = render(wanted, &camera, &settings, &|_, _| {}).unwrap();
             let mut apart: Vec<f32> = got

@@ -69,6 +69,7 @@ impl Shot {
             env_samples: if self.settings.reflections { env_samples } else { 0 },
             shadows: self.settings.shadows,
             background: self.settings.background,
+            ..reference::Settings::default()
         };
         render(scene, &self.camera, &settings, &|_, _| {}).unwrap()
     }

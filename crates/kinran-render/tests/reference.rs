@@ -718,6 +718,33 @@ fn the_picture_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
+fn later_samples_go_on_where_the_first_ended_and_seeds_have_independent_noise() {
+    let (scene, camera) = busy_scene();
+    let part = |first_sample, samples_per_pixel, seed| {
+        let size = Settings { width: 70, height: 37, ..settings(1, 1) };
+        draw(&scene, &camera, &Settings { first_sample, samples_per_pixel, seed, ..size })
+    };
+    let (first, later, all) = (part(0, 4, 3), part(4, 4, 3), part(0, 8, 3));
+    assert_ne!(first, later, "the same samples were taken twice");
+    let halves = first.pixels.as_flattened().iter().zip(later.pixels.as_flattened());
+    for ((a, b), wanted) in halves.zip(all.pixels.as_flattened()) {
+        let got = 0.5 * (a + b);
+        assert!((got - wanted).abs() <= 1e-5 * (1.0 + wanted), "wanted {wanted}, got {got}");
+    }
+
+    // Clamped, so that no pixel outweighs the others. What two differences share is the noise of a picture in both.
+    let [a, b, c, d] = [1, 2, 3, 4].map(|seed| -> Vec<f32> {
+        part(0, 4, seed).pixels.as_flattened().iter().map(|v| v.min(1.0)).collect()
+    });
+    let less = |a: &[f32], b: &[f32]| -> Vec<f32> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+    let dot = |a: &[f32], b: &[f32]| -> f32 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+    let correlation = |x: &[f32], y: &[f32]| dot(x, y) / (dot(x, x) * dot(y, y)).sqrt();
+    let (one, half) = (correlation(&less(&a, &b), &less(&c, &d)), correlation(&less(&a, &b), &less(&a, &c)));
+    assert!(one.abs() < 0.15, "noise of different seeds: wanted a correlation of 0, got {one}");
+    assert!((half - 0.5).abs() < 0.15, "noise of one seed in two differences: wanted 0.5, got {half}");
+}
+
+#[test]
 fn progress_counts_every_tile_once() {
     let (scene, camera) = busy_scene();
     let seen = std::sync::Mutex::new(Vec::new());
@@ -817,6 +844,7 @@ fn settings_out_of_range_are_refused_by_name() {
     assert_eq!(refused(&good, Settings { width: 0, ..base }), "width");
     assert_eq!(refused(&good, Settings { height: 40_000, ..base }), "height");
     assert_eq!(refused(&good, Settings { samples_per_pixel: 0, ..base }), "samples_per_pixel");
+    assert_eq!(refused(&good, Settings { first_sample: u32::MAX, ..base }), "first_sample");
     assert_eq!(refused(&good, Settings { env_samples: 5000, ..base }), "env_samples");
     let filtering = TextureFiltering::Mips { max_anisotropy: 0 };
     assert_eq!(refused(&good, Settings { filtering, ..base }), "max_anisotropy");

@@ -5,16 +5,18 @@ use std::path::{Path, PathBuf};
 use kinran_bake::aniso::Filter;
 use kinran_image::write_atomically;
 use kinran_render::metrics::{flip, rmse_linear, rmse_srgb8};
-use kinran_render::reference::{Film, RenderScene, TextureFiltering};
+use kinran_render::reference::{Film, RenderScene, SurfaceTextures, TextureFiltering};
 use kinran_scene::Scene;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::compare_sheet::{comparison_sheet, distance_sheet};
 use crate::picture::Picture;
+use crate::ranking::{Errors, FLIP_BEND, Order, order};
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::table::table;
 use crate::values::{filter, number};
-use crate::view::{View, ViewArgs, file_name};
+use crate::view::{Samples, View, ViewArgs, file_name};
 use crate::{Console, Error, Progress, outputs};
 
 /// Compares filters with ground truth, in pictures and numbers
@@ -22,7 +24,8 @@ use crate::{Console, Error, Progress, outputs};
 /// Draws the model with the mips of each filter, as a GPU would sample them after block compression, and
 /// with many samples of level 0 alone, which is ground truth; nearby and from farther and farther away.
 /// Under each picture stand the root mean square error (display-encoded, white being 1) and the mean FLIP
-/// error (Andersson et al. 2020, 67 pixels per degree).
+/// error (Andersson et al. 2020, 67 pixels per degree). All pictures have noise: a filter is marked as the
+/// nearest where it leads by more than noise explains, and a sentence for each distance says what is known.
 ///
 /// The folder then holds compare.png (side by side, with maps of the FLIP error), distance.png (a row
 /// for each filter, a column for each distance, enlarged), every picture alone, and compare.json.
@@ -53,6 +56,11 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1 << 16))]
     pub truth_spp: u32,
 
+    /// Where noise hides which filter is nearest and more samples may tell, all samples are doubled, those of ground truth up to
+    /// so many
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=1 << 18))]
+    pub most_truth_spp: u32,
+
     /// The most places along a slanted pixel's footprint at which a texture is read; 1 is trilinear
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub max_anisotropy: u32,
@@ -76,6 +84,9 @@ pub struct Options {
     pub samples_per_pixel: u32,
     /// The same for ground truth.
     pub truth_samples_per_pixel: u32,
+    /// Where noise hides which filter is nearest, samples of ground truth are doubled up to so many at distance 1, and those of
+    /// the filters with them.
+    pub most_truth_samples: u32,
     /// 1 to 16.
     pub max_anisotropy: u32,
     /// Factors of distance besides 1, each 1 or more.
@@ -110,6 +121,54 @@ pub struct MethodReport {
     pub distances: Vec<Difference>,
 }
 
+/// How far two ground truths of other random numbers are apart, each of half the samples. The noise of the one that filters
+/// are compared with is half of this RMSE: one of two noisy pictures has 1/sqrt(2) of their difference, and twice the samples
+/// take another 1/sqrt(2).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Noise {
+    /// As [`Difference::rmse`].
+    pub rmse: f64,
+    /// As [`Difference::flip`].
+    pub flip: f32,
+}
+
+/// Who is nearest to ground truth by one measure of error.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Ranking {
+    /// The filter that is nearer than all others by more than noise explains and as printed, if one is.
+    pub best: Option<&'static str>,
+    /// The nearest and all that noise does not allow to tell from it, in the order of the filters.
+    pub nearest: Vec<&'static str>,
+    /// The smallest lead over any other that would have shown, in the measure's unit.
+    pub told: f64,
+    /// About how many samples of ground truth, and as many times more of the filters, might tell the nearest apart; `None`
+    /// where they are apart, or where it takes more than a million.
+    pub samples_needed: Option<u64>,
+}
+
+/// What one distance shows.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// Factor of distance.
+    pub distance: f32,
+    /// Samples in a pixel that the filters' pictures were drawn with.
+    pub samples_per_pixel: u32,
+    /// Samples in a pixel that ground truth was drawn with.
+    pub truth_samples_per_pixel: u32,
+    /// Filters that were compared.
+    pub filters: usize,
+    /// Two ground truths compared.
+    pub noise: Noise,
+    /// By root mean square error of display-encoded values.
+    pub rmse: Ranking,
+    /// By mean FLIP.
+    pub flip: Ranking,
+    /// Whether noise explains how far every filter is from ground truth, by root mean square.
+    pub only_noise: bool,
+    /// All of this in a sentence.
+    pub says: String,
+}
+
 /// All numbers of a comparison.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
@@ -119,12 +178,14 @@ pub struct Report {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Samples in a pixel of the filters' pictures at distance 1.
+    /// Samples in a pixel of the filters' pictures at distance 1, as asked for; [`Finding`] has those that were taken.
     pub samples_per_pixel: u32,
-    /// Samples in a pixel of ground truth at distance 1.
+    /// Samples in a pixel of ground truth at distance 1, as asked for.
     pub truth_samples_per_pixel: u32,
     /// One for each filter.
     pub methods: Vec<MethodReport>,
+    /// One for each distance.
+    pub findings: Vec<Finding>,
     /// What was left out or mended in the model.
     pub warnings: Vec<String>,
 }
@@ -162,6 +223,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         filters: distinct(&args.filters),
         samples_per_pixel: args.spp,
         truth_samples_per_pixel: args.truth_spp,
+        most_truth_samples: args.most_truth_spp,
         max_anisotropy: args.max_anisotropy,
         distances: distinct(&args.distances),
         view,
@@ -185,8 +247,8 @@ fn distinct<T: PartialEq + Copy>(values: &[T]) -> Vec<T> {
 }
 
 /// Renders `scene` with each filter and as ground truth, at every distance, and measures. `title` names the
-/// scene in the pictures. The surfaces are baked once for each filter, ground truth is rendered once for each
-/// distance.
+/// scene in the pictures. Every picture is drawn in two halves of independent samples, which tell what noise is worth; where
+/// it hides which filter is nearest, samples are doubled, as far as [`Options::most_truth_samples`] allows.
 ///
 /// # Errors
 /// [`Error::Usage`] where there is no filter or no distance; those of the baker and of the renderer.
@@ -199,64 +261,85 @@ pub fn compare(
     if options.filters.is_empty() || options.distances.is_empty() {
         return Err(Error::Usage(format!("{title}: nothing to compare; give a filter and a distance")));
     }
-    let views: Vec<View> = options.distances.iter().map(|&d| options.view.zoomed_out(d)).collect();
-    let films = |prepared: &RenderScene, name: &str, samples: u32, filtering| {
-        let films = views.iter().zip(&options.distances).map(|(view, &distance)| {
-            let name = format!("{name}, distance {distance}");
-            // A pixel far away covers more of the model and needs more samples.
-            let samples = (samples as f32 * distance) as u32;
-            view.render(prepared, &name, samples, filtering, progress)
-        });
-        films.collect::<Result<Vec<Film>, Error>>()
-    };
-    let pictures = |films: &[Film]| -> Vec<Picture> {
-        let display = |film: &Film| Picture {
-            width: film.width,
-            height: film.height,
-            pixels: options.view.display(film),
+    let distances = &options.distances;
+    let views: Vec<View> = distances.iter().map(|&d| options.view.zoomed_out(d)).collect();
+    // A pixel far away covers more of the model and needs more samples.
+    let half = |samples: u32, distance: f32| ((samples as f32 * distance) as u32).div_ceil(2);
+    // All the pictures of one method that are still wanted, with as many samples as they have, or their first.
+    let draw = |taken: &mut Vec<Taken>, prepared: &RenderScene, mips: Mips, open: &[usize]| {
+        let (samples, filtering) = match mips {
+            Mips::Level0 => (options.truth_samples_per_pixel, TextureFiltering::Level0),
+            _ => {
+                (options.samples_per_pixel, TextureFiltering::Mips { max_anisotropy: options.max_anisotropy })
+            }
         };
-        films.iter().map(display).collect()
+        for &i in open {
+            let name = format!("{}, distance {}", mips.name(), distances[i]);
+            let first = taken.get(i).map_or(0, |taken| taken.of_half);
+            let count = if first > 0 { first } else { half(samples, distances[i]) };
+            let half = |seed| {
+                let samples = Samples { first, count, seed };
+                views[i].render_samples(prepared, &name, samples, filtering, progress)
+            };
+            let more = Taken { halves: [half(1)?, half(2)?], of_half: first + count };
+            match taken.get_mut(i) {
+                Some(taken) => taken.add(&more),
+                None => taken.push(more),
+            }
+        }
+        Ok::<(), Error>(())
     };
 
-    // Ground truth.
     let (surfaces, apart) = scene_surfaces(scene, Mips::Level0, progress)?;
     let warnings = scene.warnings.iter().cloned().chain(apart).collect();
     let mut prepared = options.view.scene(scene, surfaces)?;
-    let truth = films(&prepared, "truth", options.truth_samples_per_pixel, TextureFiltering::Level0)?;
-    let truth_pictures = pictures(&truth);
-
-    // The filters.
-    let mut methods = Vec::new();
-    let mut series = Vec::new();
-    for &filter in &options.filters {
-        let (surfaces, _) = scene_surfaces(scene, Mips::Filtered(filter), progress)?;
-        for (material, surface) in prepared.materials.iter_mut().zip(surfaces) {
-            material.surface = surface;
+    let mut truth = Vec::new();
+    let mut drawn: Vec<Vec<Taken>> = vec![Vec::new(); options.filters.len()];
+    let mut measured: Vec<Vec<Measured>> = drawn.iter().map(|_| Vec::new()).collect();
+    let mut findings: Vec<Finding> = Vec::new();
+    let mut open: Vec<usize> = (0..distances.len()).collect();
+    while !open.is_empty() {
+        if !findings.is_empty() {
+            set_surfaces(&mut prepared, scene_surfaces(scene, Mips::Level0, progress)?.0);
         }
-        let filtering = TextureFiltering::Mips { max_anisotropy: options.max_anisotropy };
-        let films = films(&prepared, filter.name(), options.samples_per_pixel, filtering)?;
-        let pictures = pictures(&films);
-        let mut differences = Vec::new();
-        let mut errors = Vec::new();
-        for (i, &distance) in options.distances.iter().enumerate() {
-            let (width, height) = (films[i].width, films[i].height);
-            let (wanted, got) = (&truth_pictures[i].pixels, &pictures[i].pixels);
-            let flip = flip(wanted, got, width, height)?;
-            differences.push(Difference {
-                distance,
-                width,
-                height,
-                rmse: rmse_srgb8(wanted, got)?,
-                rmse_linear: rmse_linear(&truth[i].pixels, &films[i].pixels)?,
-                flip: flip.mean,
-            });
-            errors.push(flip.map);
+        draw(&mut truth, &prepared, Mips::Level0, &open)?;
+        for (method, &filter) in options.filters.iter().enumerate() {
+            let mips = Mips::Filtered(filter);
+            set_surfaces(&mut prepared, scene_surfaces(scene, mips, progress)?.0);
+            draw(&mut drawn[method], &prepared, mips, &open)?;
+            for &i in &open {
+                let distance = distances[i];
+                put(
+                    &mut measured[method],
+                    i,
+                    measure(&options.view, distance, &truth[i], &drawn[method][i])?,
+                );
+            }
         }
-        methods.push(MethodReport { filter: filter.name(), distances: differences });
-        series.push(Series { name: filter.name(), pictures, errors });
+        for &i in &open {
+            let errors: Vec<&Measured> = measured.iter().map(|of| &of[i]).collect();
+            put(&mut findings, i, find(options, &truth[i], &drawn[0][i], &errors)?);
+        }
+        // Samples are doubled where that may be enough.
+        open.retain(|&i| {
+            let most = f64::from(options.most_truth_samples) * f64::from(distances[i]);
+            let taken = f64::from(findings[i].truth_samples_per_pixel);
+            let wanted = [&findings[i].rmse, &findings[i].flip].map(Ranking::wanted_samples);
+            2.0 * taken <= most && wanted.into_iter().flatten().any(|samples| samples as f64 <= most)
+        });
     }
-    series.insert(0, Series { name: Mips::Level0.name(), pictures: truth_pictures, errors: Vec::new() });
 
+    let pictures = |taken: &[Taken]| -> Vec<Picture> {
+        taken.iter().map(|taken| picture(&options.view, &taken.whole())).collect()
+    };
+    let mut series =
+        vec![Series { name: Mips::Level0.name(), pictures: pictures(&truth), errors: Vec::new() }];
+    let mut methods = Vec::new();
+    for ((filter, taken), measured) in options.filters.iter().zip(&drawn).zip(measured) {
+        let (differences, errors) = measured.into_iter().map(|m| (m.difference, m.map)).unzip();
+        methods.push(MethodReport { filter: filter.name(), distances: differences });
+        series.push(Series { name: filter.name(), pictures: pictures(taken), errors });
+    }
     let report = Report {
         title: title.into(),
         width: options.view.size.0,
@@ -264,9 +347,206 @@ pub fn compare(
         samples_per_pixel: options.samples_per_pixel,
         truth_samples_per_pixel: options.truth_samples_per_pixel,
         methods,
+        findings,
         warnings,
     };
     Ok(Comparison { report, series })
+}
+
+/// What stands under tables.
+pub(crate) const LEGEND: &str = "The nearest to ground truth is marked where it leads by more than noise explains. \
+    \"Noise\" is two ground truths of half the samples compared.";
+
+/// The value at `index`, which is one that is there or the next.
+fn put<T>(values: &mut Vec<T>, index: usize, value: T) {
+    match values.get_mut(index) {
+        Some(old) => *old = value,
+        None => values.push(value),
+    }
+}
+
+fn set_surfaces(prepared: &mut RenderScene, surfaces: Vec<Option<SurfaceTextures>>) {
+    for (material, surface) in prepared.materials.iter_mut().zip(surfaces) {
+        material.surface = surface;
+    }
+}
+
+/// A picture in two halves of independent samples.
+#[derive(Clone)]
+struct Taken {
+    halves: [Film; 2],
+    /// Samples of a pixel in each.
+    of_half: u32,
+}
+
+impl Taken {
+    /// As many samples more.
+    fn add(&mut self, more: &Taken) {
+        for (film, more) in self.halves.iter_mut().zip(&more.halves) {
+            *film = mean(film, more);
+        }
+        self.of_half = more.of_half;
+    }
+
+    /// The picture of all samples.
+    fn whole(&self) -> Film {
+        mean(&self.halves[0], &self.halves[1])
+    }
+}
+
+fn mean(a: &Film, b: &Film) -> Film {
+    let pixels = a.pixels.iter().zip(&b.pixels);
+    Film { pixels: pixels.map(|(a, b)| [0, 1, 2].map(|c| 0.5 * (a[c] + b[c]))).collect(), ..*a }
+}
+
+fn picture(view: &View, film: &Film) -> Picture {
+    Picture { width: film.width, height: film.height, pixels: view.display(film) }
+}
+
+/// What is known of one filter's picture.
+struct Measured {
+    difference: Difference,
+    /// FLIP, pixel by pixel.
+    map: Vec<f32>,
+    /// Squares of display-encoded differences, and FLIP.
+    squares: Errors,
+    flip: Errors,
+}
+
+fn measure(view: &View, distance: f32, truth: &Taken, taken: &Taken) -> Result<Measured, Error> {
+    let (truth_film, film) = (truth.whole(), taken.whole());
+    let (width, height) = (film.width, film.height);
+    let pairs =
+        [(&truth.halves[0], &taken.halves[0]), (&truth.halves[1], &taken.halves[1]), (&truth_film, &film)];
+    let errors = pairs.into_par_iter().map(|(truth, film)| {
+        let (wanted, got) = (view.display(truth), view.display(film));
+        Ok((squares(&wanted, &got), flip(&wanted, &got, width, height)?))
+    });
+    let [a, b, whole] = <[_; 3]>::try_from(errors.collect::<Result<Vec<_>, Error>>()?).expect("three pairs");
+    let rmse = (whole.0.iter().map(|&e| f64::from(e)).sum::<f64>() / whole.0.len() as f64).sqrt();
+    Ok(Measured {
+        difference: Difference {
+            distance,
+            width,
+            height,
+            rmse,
+            rmse_linear: rmse_linear(&truth_film.pixels, &film.pixels)?,
+            flip: whole.1.mean,
+        },
+        squares: Errors::new(width as usize, [&a.0, &b.0], &whole.0),
+        flip: Errors::new(width as usize, [&a.1.map, &b.1.map], &whole.1.map),
+        map: whole.1.map,
+    })
+}
+
+/// The mean square over the channels of each pixel, black to white being 1.
+fn squares(a: &[[u8; 3]], b: &[[u8; 3]]) -> Vec<f32> {
+    let square = |a: u8, b: u8| ((f32::from(a) - f32::from(b)) / 255.0).powi(2);
+    let pixels = a.iter().zip(b);
+    pixels.map(|(a, b)| (0..3).map(|c| square(a[c], b[c])).sum::<f32>() / 3.0).collect()
+}
+
+/// What one distance shows; `errors` are of each filter, `truth` and `drawn` of ground truth and any filter.
+fn find(options: &Options, truth: &Taken, drawn: &Taken, errors: &[&Measured]) -> Result<Finding, Error> {
+    let [a, b] = [0, 1].map(|half| options.view.display(&truth.halves[half]));
+    let Difference { distance, width, height, .. } = errors[0].difference;
+    let noise = Noise { rmse: rmse_srgb8(&a, &b)?, flip: flip(&a, &b, width, height)?.mean };
+    let ranking = |order: Order, printed: Vec<f64>, unit: &dyn Fn(f64) -> f64| {
+        // What looks equal is equally good.
+        let digits = |x: f64| (x * 1e4).round();
+        let is_near = |&i: &usize| {
+            i == order.first || order.alike.contains(&i) || digits(printed[i]) <= digits(printed[order.first])
+        };
+        let nearest: Vec<&str> =
+            (0..printed.len()).filter(is_near).map(|i| options.filters[i].name()).collect();
+        let needed = order.samples * f64::from(2 * truth.of_half);
+        Ranking {
+            best: (nearest.len() == 1 && printed.len() > 1).then(|| nearest[0]),
+            told: unit(order.told),
+            samples_needed: (!order.alike.is_empty() && needed <= MOST_SAMPLES).then_some(needed as u64),
+            nearest,
+        }
+    };
+    let squares: Vec<&Errors> = errors.iter().map(|m| &m.squares).collect();
+    let flips: Vec<&Errors> = errors.iter().map(|m| &m.flip).collect();
+    let by_squares = order(&squares, 0.0);
+    let first = errors[by_squares.first].difference.rmse;
+    let root = |square: f64| (first * first + square).sqrt() - first;
+    let mut finding = Finding {
+        distance,
+        samples_per_pixel: 2 * drawn.of_half,
+        truth_samples_per_pixel: 2 * truth.of_half,
+        filters: errors.len(),
+        noise,
+        rmse: ranking(by_squares, errors.iter().map(|m| m.difference.rmse).collect(), &root),
+        flip: ranking(
+            order(&flips, FLIP_BEND),
+            errors.iter().map(|m| m.difference.flip.into()).collect(),
+            &|flip| flip,
+        ),
+        only_noise: squares.iter().all(|errors| errors.is_noise()),
+        says: String::new(),
+    };
+    finding.says = finding.sentence();
+    Ok(finding)
+}
+
+/// The most samples of a pixel that are drawn; more are of no use to name.
+const MOST_SAMPLES: f64 = 1_048_576.0;
+
+/// Leads below this are not worth more samples: an eighth of a step of 8 bits.
+const NEGLIGIBLE: f64 = 5e-4;
+
+impl Ranking {
+    /// The samples that would tell which filter is nearest, where that is not known, is worth knowing, and can be.
+    fn wanted_samples(&self) -> Option<u64> {
+        self.samples_needed.filter(|_| self.told > NEGLIGIBLE)
+    }
+
+    /// What it says, of so many filters.
+    fn phrase(&self, filters: usize) -> String {
+        let who = match self.nearest.as_slice() {
+            [one] => return format!("{one} is nearest"),
+            all if all.len() == filters && filters > 2 => "all filters are alike".into(),
+            [rest @ .., last] => {
+                let nearer = if rest.len() + 1 == filters { "alike" } else { "nearest and alike" };
+                format!("{} and {last} are {nearer}", rest.join(", "))
+            }
+            [] => unreachable!("one is nearest"),
+        };
+        let needed = match self.samples_needed {
+            Some(samples) => format!(", about {} samples might tell", rounded(samples)),
+            None => String::new(),
+        };
+        format!("{who} (a lead of {:.4} would show{needed})", self.told)
+    }
+}
+
+impl Finding {
+    /// What the numbers of this distance show, in a sentence.
+    fn sentence(&self) -> String {
+        let filters = self.filters;
+        let samples = self.truth_samples_per_pixel;
+        let head = format!("Distance {}, {samples} samples of ground truth:", self.distance);
+        let [rmse, flip] = [&self.rmse, &self.flip].map(|ranking| ranking.phrase(filters));
+        match (filters, self.only_noise) {
+            (1, true) => format!("{head} {} is off by noise alone.", self.rmse.nearest[0]),
+            (1, false) => format!("{head} {} is off by more than noise.", self.rmse.nearest[0]),
+            (_, true) if self.flip.best.is_none() => {
+                format!(
+                    "{head} no difference from it, nor between filters, that so many can show; errors are noise."
+                )
+            }
+            _ if self.rmse.best.is_some() && rmse == flip => format!("{head} by RMSE and FLIP {rmse}."),
+            _ => format!("{head} by RMSE {rmse}; by FLIP {flip}."),
+        }
+    }
+}
+
+/// Two digits, as an estimate deserves.
+fn rounded(number: u64) -> u64 {
+    let step = 10u64.pow(number.max(1).ilog10().saturating_sub(1));
+    number.div_ceil(step) * step
 }
 
 impl Comparison {
@@ -280,19 +560,29 @@ impl Comparison {
         distance_sheet(self)
     }
 
-    /// The numbers as a table: RMSE and FLIP for each filter and distance.
+    /// The numbers as a table: RMSE and FLIP for each filter and distance, those of the nearest filter with a star where noise
+    /// allows to say so, and a sentence for each distance.
     pub fn table(&self) -> String {
+        let findings = &self.report.findings;
         let mut rows = vec![vec!["filter".into()]];
-        for difference in &self.report.methods[0].distances {
-            rows[0].push(format!("RMSE x{}", difference.distance));
-            rows[0].push(format!("FLIP x{}", difference.distance));
+        for finding in findings {
+            rows[0].push(format!("RMSE x{}", finding.distance));
+            rows[0].push(format!("FLIP x{}", finding.distance));
         }
-        rows.extend(self.report.methods.iter().map(|method| {
-            let numbers =
-                method.distances.iter().flat_map(|d| [format!("{:.4}", d.rmse), format!("{:.4}", d.flip)]);
-            std::iter::once(method.filter.to_owned()).chain(numbers).collect()
-        }));
-        table(&rows)
+        for method in &self.report.methods {
+            let mut row = vec![method.filter.to_owned()];
+            for (d, finding) in method.distances.iter().zip(findings) {
+                for (error, ranking) in [(d.rmse, &finding.rmse), (d.flip.into(), &finding.flip)] {
+                    let star = if ranking.best == Some(method.filter) { "*" } else { "" };
+                    row.push(format!("{star}{error:.4}"));
+                }
+            }
+            rows.push(row);
+        }
+        let noise = |f: &Finding| [format!("{:.4}", f.noise.rmse), format!("{:.4}", f.noise.flip)];
+        rows.push(std::iter::once("noise".to_owned()).chain(findings.iter().flat_map(noise)).collect());
+        let says: String = findings.iter().map(|finding| format!("{}\n", finding.says)).collect();
+        format!("{}\n{says}{LEGEND}\n", table(&rows))
     }
 
     /// Writes `compare.png`, `distance.png`, every picture alone and `compare.json` to `folder`, which

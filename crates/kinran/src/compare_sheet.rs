@@ -1,141 +1,220 @@
 //! The layout of comparison pictures.
 
-use crate::compare::{Comparison, Difference, Series};
-use crate::picture::{Color, INK, PAPER, Picture};
+use crate::compare::{Comparison, Difference, Finding, LEGEND, MethodReport, Ranking, Series};
+use crate::picture::{Color, INK, PAPER, Picture, text_width, wrapped};
 
 /// All colours and lengths are chosen by eye.
-const FAINT: Color = [150, 153, 162];
+const FAINT: Color = [170, 172, 180];
 const BEST: Color = [126, 211, 138];
 
 /// Pixels between pictures, around them, and from a picture to the words under it.
 const GAP: u32 = 16;
 
-/// Heights of text in pixels.
-const TITLE: f32 = 26.0;
-const NAME: f32 = 20.0;
-const NOTE: f32 = 15.0;
-
 /// The narrowest column that holds the words under a picture.
 const COLUMN: u32 = 300;
 
-/// Width of the rows' names in the distance sheet.
-const MARGIN: u32 = 130;
+/// Heights of letters, and other lengths that grow with them: a sheet of larger pictures has larger words, so that both can be
+/// seen when it is scaled down.
+struct Scale(f32);
+
+impl Scale {
+    fn of(width: u32) -> Self {
+        Scale(width.max(COLUMN) as f32 / COLUMN as f32)
+    }
+
+    fn title(&self) -> f32 {
+        30.0 * self.0
+    }
+
+    fn name(&self) -> f32 {
+        24.0 * self.0
+    }
+
+    fn note(&self) -> f32 {
+        18.0 * self.0
+    }
+
+    /// So many pixels of a sheet of the smallest columns.
+    fn length(&self, pixels: u32) -> u32 {
+        (pixels as f32 * self.0) as u32
+    }
+}
+
+/// So many times as large as fills a column best, each pixel a square.
+fn enlarged(width: u32, height: u32) -> (u32, u32) {
+    let times = ((COLUMN + width / 2) / width).max(1);
+    (times * width, times * height)
+}
 
 /// What a method is, in a few words.
 fn description(name: &str) -> &'static str {
     match name {
-        "truth" => "ground truth, level 0 alone",
-        "ml" => "maximum-likelihood GGX",
-        "linear" => "average of SGGX matrices",
-        "param" => "SGGX parameter estimation",
+        "truth" => "ground truth",
+        "ml" => "most likely GGX",
+        "linear" => "mean of SGGX matrices",
+        "param" => "SGGX parameters",
         "lean" => "LEAN mapping",
-        _ => "average, renormalise",
+        _ => "maps averaged as colours",
     }
 }
 
-/// Ground truth and the filters side by side, their numbers, and below the maps of the FLIP error.
+/// Ground truth and the filters side by side, their numbers, below the maps of the FLIP error, and what all of it shows.
 pub(crate) fn comparison_sheet(comparison: &Comparison) -> Picture {
     let report = &comparison.report;
-    let (width, height) = (comparison.series[0].pictures[0].width, comparison.series[0].pictures[0].height);
+    let finding = &report.findings[0];
+    let first = &comparison.series[0].pictures[0];
+    let (width, height) = enlarged(first.width, first.height);
+    let scale = Scale::of(width);
     let column = width.max(COLUMN) + GAP;
-    let top = 112;
-    let captions = top + height;
-    let maps = captions + 62;
     let count = comparison.series.len() as u32;
-    let mut sheet = Picture::new(GAP + count * column, maps + height + GAP, PAPER);
+    let sheet_width = GAP + count * column;
+    let words = Words::new(&scale, sheet_width, [finding]);
+    let top = scale.length(118);
+    let captions = top + height;
+    let maps = captions + scale.length(44);
+    let end = maps + height.max(scale.length(130));
+    let mut sheet = Picture::new(sheet_width, end + words.height(&scale), PAPER);
 
-    let title_end = sheet.text((GAP, 38), TITLE, INK, &report.title);
-    let samples = format!(
-        "{} samples a pixel, ground truth {}",
-        report.samples_per_pixel, report.truth_samples_per_pixel
-    );
-    sheet.text((title_end + 2 * GAP, 38), NOTE, FAINT, &samples);
+    let title_end = sheet.text((GAP, scale.length(40)), scale.title(), INK, &report.title);
+    let samples =
+        format!("{} samples, ground truth {}", finding.samples_per_pixel, finding.truth_samples_per_pixel);
+    sheet.text((title_end + 2 * GAP, scale.length(40)), scale.note(), FAINT, &samples);
 
-    let differences: Vec<Difference> = report.methods.iter().map(|m| m.distances[0]).collect();
     let range = error_range(&comparison.series[1..]);
     for (i, series) in comparison.series.iter().enumerate() {
         let x = GAP + i as u32 * column;
-        sheet.text((x, top - 36), NAME, INK, series.name);
-        sheet.text((x, top - 14), NOTE, FAINT, description(series.name));
-        sheet.draw(x, top, &series.pictures[0]);
+        sheet.text((x, top - scale.length(38)), scale.name(), INK, series.name);
+        sheet.text((x, top - scale.length(12)), scale.note(), FAINT, description(series.name));
+        sheet.draw(x, top, &series.pictures[0].scaled(width, height));
+        let numbers_at = (x, captions + scale.length(26));
         match i.checked_sub(1) {
-            None => legend(&mut sheet, (x, maps), width, range),
+            None => {
+                noise(&mut sheet, &scale, numbers_at, finding);
+                legend(&mut sheet, &scale, (x, maps), width.max(COLUMN), range);
+            }
             Some(method) => {
-                numbers(&mut sheet, (x, captions + 24), &differences, method);
-                sheet.draw(x, maps, &error_map(series, (width, height), range));
+                numbers(&mut sheet, &scale, numbers_at, &report.methods[method], 0, finding);
+                let map = error_map(series, (first.width, first.height), range);
+                sheet.draw(x, maps, &map.scaled(width, height));
             }
         }
     }
+    words.draw(&mut sheet, &scale, end);
     sheet
 }
 
-/// A row for each method, a column for each distance.
+/// A row for each method, a column for each distance, and what each distance shows.
 pub(crate) fn distance_sheet(comparison: &Comparison) -> Picture {
     let report = &comparison.report;
     let nearest = comparison.series[0].pictures.iter().max_by_key(|p| p.width).expect("there is a distance");
-    let (width, height) = (nearest.width, nearest.height);
-    let (column, row) = (width.max(COLUMN) + GAP, height + 40);
-    let top = 100;
+    let (width, height) = enlarged(nearest.width, nearest.height);
+    let scale = Scale::of(width);
+    let (column, row) = (width.max(COLUMN) + GAP, height + scale.length(40));
+    let (top, margin) = (scale.length(100), scale.length(110));
     let distances = &report.methods[0].distances;
     let rows = comparison.series.len() as u32;
-    let mut sheet = Picture::new(MARGIN + distances.len() as u32 * column, top + rows * row, PAPER);
+    let sheet_width = margin + distances.len() as u32 * column;
+    let words = Words::new(&scale, sheet_width, &report.findings);
+    let mut sheet = Picture::new(sheet_width, top + rows * row + words.height(&scale), PAPER);
 
-    sheet.text((GAP, 38), TITLE, INK, &report.title);
+    sheet.text((GAP, scale.length(40)), scale.title(), INK, &report.title);
     for (j, difference) in distances.iter().enumerate() {
         let Difference { distance, width, height, .. } = difference;
-        let heading = format!("distance x{distance}");
-        let x = MARGIN + j as u32 * column;
-        let end = sheet.text((x, top - 14), NAME, INK, &heading);
-        sheet.text((end + GAP, top - 14), NOTE, FAINT, &format!("{width}x{height}"));
+        let heading = format!("distance {distance}");
+        let x = margin + j as u32 * column;
+        let end = sheet.text((x, top - scale.length(14)), scale.name(), INK, &heading);
+        let pixels = format!("{width}x{height}");
+        sheet.text((end + GAP, top - scale.length(14)), scale.note(), FAINT, &pixels);
     }
     for (i, series) in comparison.series.iter().enumerate() {
         let y = top + i as u32 * row;
-        sheet.text((GAP, y + 22), NAME, INK, series.name);
+        sheet.text((GAP, y + scale.length(24)), scale.name(), INK, series.name);
         for (j, picture) in series.pictures.iter().enumerate() {
-            let x = MARGIN + j as u32 * column;
+            let x = margin + j as u32 * column;
             sheet.draw(x, y, &picture.scaled(width, height));
-            if let Some(method) = i.checked_sub(1) {
-                let differences: Vec<Difference> = report.methods.iter().map(|m| m.distances[j]).collect();
-                numbers(&mut sheet, (x, y + height + 20), &differences, method);
+            let at = (x, y + height + scale.length(24));
+            match i.checked_sub(1) {
+                None => noise(&mut sheet, &scale, at, &report.findings[j]),
+                Some(method) => {
+                    numbers(&mut sheet, &scale, at, &report.methods[method], j, &report.findings[j]);
+                }
             }
         }
     }
+    words.draw(&mut sheet, &scale, top + rows * row);
     sheet
 }
 
-/// The numbers of one method, those green that are the best of all methods.
-fn numbers(sheet: &mut Picture, at: (u32, u32), all: &[Difference], method: usize) {
-    let this = &all[method];
-    let color = |best: bool| if best { BEST } else { INK };
-    // As printed: what looks equal is equally good.
-    let printed = |x: f64| (x * 1e4).round();
-    let rmse = all.iter().all(|d| printed(this.rmse) <= printed(d.rmse));
-    let flip = all.iter().all(|d| printed(this.flip.into()) <= printed(d.flip.into()));
-    let end = sheet.text(at, NOTE, color(rmse), &format!("RMSE {:.4}", this.rmse));
-    sheet.text((end + GAP, at.1), NOTE, color(flip), &format!("FLIP {:.4}", this.flip));
+/// The lines under a sheet: what its numbers show.
+struct Words(Vec<String>);
+
+impl Words {
+    fn new<'a>(scale: &Scale, sheet_width: u32, findings: impl IntoIterator<Item = &'a Finding>) -> Self {
+        let texts = findings.into_iter().map(|finding| finding.says.as_str()).chain([LEGEND]);
+        Words(texts.flat_map(|text| wrapped(scale.note(), sheet_width - 2 * GAP, text)).collect())
+    }
+
+    fn line(scale: &Scale) -> u32 {
+        scale.length(26)
+    }
+
+    fn height(&self, scale: &Scale) -> u32 {
+        2 * GAP + self.0.len() as u32 * Self::line(scale)
+    }
+
+    fn draw(&self, sheet: &mut Picture, scale: &Scale, top: u32) {
+        for (i, text) in (1..).zip(&self.0) {
+            sheet.text((GAP, top + GAP / 2 + i * Self::line(scale)), scale.note(), INK, text);
+        }
+    }
 }
 
-/// The largest FLIP error that the maps' colours tell apart: the roundest one that all but a few pixels of
-/// all maps stay below.
+/// The numbers of one method at one distance, green where it is known to be the nearest.
+fn numbers(
+    sheet: &mut Picture,
+    scale: &Scale,
+    at: (u32, u32),
+    method: &MethodReport,
+    distance: usize,
+    finding: &Finding,
+) {
+    let this = &method.distances[distance];
+    let color = |ranking: &Ranking| if ranking.best == Some(method.filter) { BEST } else { INK };
+    let rmse = format!("RMSE {:.4}", this.rmse);
+    let end = sheet.text(at, scale.note(), color(&finding.rmse), &rmse);
+    sheet.text((end + GAP, at.1), scale.note(), color(&finding.flip), &format!("FLIP {:.4}", this.flip));
+}
+
+/// What noise alone comes to.
+fn noise(sheet: &mut Picture, scale: &Scale, at: (u32, u32), finding: &Finding) {
+    let text = format!("noise {:.4} / {:.4}", finding.noise.rmse, finding.noise.flip);
+    sheet.text(at, scale.note(), FAINT, &text);
+}
+
+/// The FLIP error at which all maps of a sheet are brightest: the roundest one that 99 of 100 pixels of all maps stay below.
 fn error_range(methods: &[Series]) -> f32 {
     let mut errors: Vec<f32> = methods.iter().flat_map(|series| series.errors[0].iter().copied()).collect();
     errors.sort_by(f32::total_cmp);
-    let most = errors.get(errors.len() * 998 / 1000).copied().unwrap_or(1.0);
-    [0.1, 0.2, 0.5].into_iter().find(|range| most <= *range).unwrap_or(1.0)
+    let most = errors.get(errors.len() * 99 / 100).copied().unwrap_or(1.0);
+    [0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7]
+        .into_iter()
+        .find(|range| most <= *range)
+        .unwrap_or(1.0)
 }
 
 /// What the colours of the maps mean.
-fn legend(sheet: &mut Picture, (x, y): (u32, u32), width: u32, range: f32) {
-    let bar = Picture { width: 256, height: 1, pixels: magma() }.scaled(width, 14);
-    sheet.text((x, y + 18), NAME, INK, "FLIP error");
-    sheet.draw(x, y + 32, &bar);
-    sheet.text((x, y + 66), NOTE, FAINT, "0");
+fn legend(sheet: &mut Picture, scale: &Scale, (x, y): (u32, u32), width: u32, range: f32) {
+    let bar = Picture { width: 256, height: 1, pixels: magma() }.scaled(width, scale.length(16));
+    sheet.text((x, y + scale.length(20)), scale.name(), INK, "FLIP error");
+    sheet.draw(x, y + scale.length(34), &bar);
+    let below = y + scale.length(70);
+    sheet.text((x, below), scale.note(), FAINT, "0");
     let last = if range < 1.0 { format!("{range} or more") } else { "1".into() };
-    let mut measure = Picture::new(0, 0, PAPER);
-    let length = measure.text((0, 0), NOTE, FAINT, &last);
-    sheet.text((x + width.saturating_sub(length), y + 66), NOTE, FAINT, &last);
-    sheet.text((x, y + 98), NOTE, FAINT, "0 looks the same, 1 is as far");
-    sheet.text((x, y + 118), NOTE, FAINT, "apart as colours can be");
+    let length = text_width(scale.note(), &last);
+    sheet.text((x + width.saturating_sub(length), below), scale.note(), FAINT, &last);
+    for (i, line) in (1..).zip(["0 looks the same, 1 is as", "far apart as can be"]) {
+        sheet.text((x, below + i * scale.length(24)), scale.note(), FAINT, line);
+    }
 }
 
 fn error_map(series: &Series, (width, height): (u32, u32), range: f32) -> Picture {

@@ -19,7 +19,7 @@ use kinran_render::reference::TextureFiltering;
 use kinran_scene::Scene;
 use serde::Serialize;
 
-use crate::compare::{self, MethodReport, compare};
+use crate::compare::{self, Finding, MethodReport, compare};
 use crate::picture::Picture;
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::view::{View, ViewArgs, file_name};
@@ -105,6 +105,8 @@ pub(crate) struct Shown {
     distance: String,
     /// The numbers.
     methods: Vec<MethodReport>,
+    /// What they show, for each distance.
+    findings: Vec<Finding>,
     /// The commands that make these files from the maps and the model.
     commands: Vec<String>,
 }
@@ -138,11 +140,11 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
 
     let mut text = String::new();
     for shown in &materials {
-        let nearest = |m: &MethodReport| format!("{} {:.4}", m.filter, m.distances[0].rmse);
-        let numbers = shown.methods.iter().map(nearest).collect::<Vec<_>>().join(", ");
+        let error = |m: &MethodReport| format!("{} {:.4}", m.filter, m.distances[0].rmse);
+        let numbers = shown.methods.iter().map(error).collect::<Vec<_>>().join(", ");
         text += &format!("{}: {}\n", shown.subject.title(), args.output.join(&shown.picture).display());
         text += &format!("    comparison: {}\n", args.output.join(&shown.comparison).display());
-        text += &format!("    error against ground truth: {numbers}\n");
+        text += &format!("    root mean square error: {numbers}\n    {}\n", shown.findings[0].says);
     }
     text += &format!("Maps, baked textures, models and all pictures are on {}", page.display());
     console.result(&Summary { page: "index.html".into(), materials }, &text)
@@ -194,6 +196,7 @@ fn show(subject: Subject, scale: &Scale, folder: &Path, progress: &Progress) -> 
         filters: vec![Filter::Ml, Filter::Linear, Filter::Lean, Filter::Naive],
         samples_per_pixel: scale.samples,
         truth_samples_per_pixel: scale.truth_samples,
+        most_truth_samples: scale.truth_samples,
         max_anisotropy: 16,
         distances: scale.distances.to_vec(),
         view: view(&scene, subject, scale.compared)?,
@@ -216,6 +219,7 @@ fn show(subject: Subject, scale: &Scale, folder: &Path, progress: &Progress) -> 
         comparison: format!("{compare_folder}/compare.png"),
         distance: format!("{compare_folder}/distance.png"),
         methods: comparison.report.methods,
+        findings: comparison.report.findings,
     })
 }
 
@@ -256,10 +260,11 @@ fn commands(subject: Subject, scale: &Scale) -> Vec<String> {
             scale.hero_samples
         ),
         format!(
-            "kinran compare {name}.glb -o compare/{name} --size {} --spp {} --truth-spp {} --distances \
-             {distances} {view}",
+            "kinran compare {name}.glb -o compare/{name} --size {} --spp {} --truth-spp {} --most-truth-spp {} \
+             --distances {distances} {view}",
             size(scale.compared),
             scale.samples,
+            scale.truth_samples,
             scale.truth_samples
         ),
     ]

@@ -27,6 +27,82 @@ pub struct Picture {
     pub pixels: Vec<Color>,
 }
 
+/// A row of pictures of one size under their labels.
+pub(crate) struct Row {
+    /// What stands over the row, from its left edge on; may be empty.
+    pub(crate) name: String,
+    /// Labels, which may be empty, and pictures.
+    pub(crate) cells: Vec<(String, Picture)>,
+}
+
+/// Pixels between pictures; chosen by eye.
+const GAP: u32 = 10;
+
+/// Heights of letters: a sheet that is scaled to a page of 1000 pixels has letters of 14 pixels, if labels fit over their
+/// pictures; none is lower than 15, for which columns grow.
+const LETTERS_IN_A_SHEET: f32 = 70.0;
+const LOWEST_LETTER: f32 = 15.0;
+
+/// Rows of pictures on one sheet, all pictures of the same size.
+pub(crate) fn grid(rows: &[Row]) -> Picture {
+    let cells = || rows.iter().flat_map(|row| &row.cells);
+    let Some((_, first)) = cells().next() else { return Picture::new(0, 0, PAPER) };
+    let columns = rows.iter().map(|row| row.cells.len()).max().unwrap_or(0) as u32;
+    let longest = |size: f32| cells().map(|(label, _)| text_width(size, label)).max().unwrap_or(0);
+    let step = GAP + first.width.max(longest(LOWEST_LETTER));
+    let sheet_width = GAP + columns * step;
+    // All letters of the font are equally wide.
+    let fitting = LOWEST_LETTER * (step - GAP) as f32 / longest(LOWEST_LETTER).max(1) as f32;
+    let letter = (sheet_width as f32 / LETTERS_IN_A_SHEET).min(fitting).max(LOWEST_LETTER).floor();
+    let line = (1.7 * letter) as u32;
+
+    let lines = |row: &Row| {
+        let labelled = row.cells.iter().any(|(label, _)| !label.is_empty());
+        (wrapped(letter, sheet_width - 2 * GAP, &row.name), labelled)
+    };
+    let height_of = |row: &Row| {
+        let (name, labelled) = lines(row);
+        (name.len() as u32 + u32::from(labelled)) * line + first.height + GAP
+    };
+    let mut sheet = Picture::new(sheet_width, rows.iter().map(height_of).sum(), PAPER);
+    let mut top = 0;
+    for row in rows {
+        let (name, labelled) = lines(row);
+        let base = |lines: u32| top + lines * line + (1.25 * letter) as u32;
+        for (i, text) in (0..).zip(&name) {
+            sheet.text((GAP, base(i)), letter, INK, text);
+        }
+        let below = name.len() as u32;
+        let pictures = top + (below + u32::from(labelled)) * line;
+        for (i, (label, picture)) in (0..).zip(&row.cells) {
+            sheet.text((GAP + i * step, base(below)), letter, INK, label);
+            sheet.draw(GAP + i * step, pictures, picture);
+        }
+        top += height_of(row);
+    }
+    sheet
+}
+
+/// Columns that a line of text takes.
+pub(crate) fn text_width(size: f32, text: &str) -> u32 {
+    let font = FONT.as_scaled(PxScale::from(size));
+    text.chars().map(|c| font.h_advance(font.glyph_id(c))).sum::<f32>().ceil() as u32
+}
+
+/// Text cut between words into lines of at most so many columns; a word that is longer has a line of its own.
+pub(crate) fn wrapped(size: f32, columns: u32, text: &str) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if text_width(size, &format!("{line} {word}")) <= columns => {
+                *line += &format!(" {word}")
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
 static FONT: LazyLock<FontRef> = LazyLock::new(|| {
     FontRef::try_from_slice(epaint_default_fonts::HACK_REGULAR).expect("the font that is built in is sound")
 });
@@ -154,6 +230,38 @@ mod tests {
             "ink at {columns:?}, end {end}"
         );
         assert!(columns.len() > 40, "only {} columns of ink", columns.len());
+    }
+
+    #[test]
+    fn lines_end_between_words_and_hold_all_of_them() {
+        let text = "no difference that  256 samples can show extraordinarily";
+        let lines = wrapped(20.0, 160, text);
+        assert!(lines.iter().all(|l| text_width(20.0, l) <= 160 || !l.contains(' ')), "{lines:?}");
+        assert_eq!(lines.join(" "), text.split_whitespace().collect::<Vec<_>>().join(" "));
+        assert!(lines.len() > 3 && wrapped(20.0, 160, "").is_empty(), "{lines:?}");
+    }
+
+    /// Labels must not run into their neighbours', and must be large enough on a sheet that is scaled to a page.
+    #[test]
+    fn labels_fit_over_their_pictures_and_are_legible_in_wide_sheets() {
+        for (width, columns) in [(60, 6), (512, 6), (512, 2), (1000, 3)] {
+            let cells =
+                (0..columns).map(|_| ("WWWWWWWWWWWW".to_owned(), Picture::new(width, 8, PAPER))).collect();
+            let sheet = grid(&[Row { name: String::new(), cells }]);
+            let inked: Vec<bool> = (0..sheet.width)
+                .map(|x| (0..sheet.height).any(|y| sheet.pixels[(y * sheet.width + x) as usize] != PAPER))
+                .collect();
+            let step = (sheet.width - GAP) / columns;
+            assert!(
+                (1..=columns).all(|i| !inked[(i * step) as usize + 3]),
+                "{width} x {columns}: labels touch"
+            );
+            let rows = (0..sheet.height)
+                .filter(|y| (0..sheet.width).any(|x| sheet.pixels[(y * sheet.width + x) as usize] != PAPER));
+            // Capitals are three quarters as high as the font.
+            let scaled = rows.count() as f32 * (1000.0 / sheet.width as f32).min(1.0);
+            assert!(scaled >= 7.0, "{width} x {columns}: letters of {scaled} pixels on a page");
+        }
     }
 
     #[test]

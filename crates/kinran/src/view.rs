@@ -164,6 +164,15 @@ pub struct View {
     pub detail: DetailShown,
 }
 
+/// Which samples of a pixel a picture is made of: [`Settings::first_sample`], [`Settings::samples_per_pixel`],
+/// [`Settings::seed`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Samples {
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+    pub(crate) seed: u32,
+}
+
 /// Radiance behind models where no environment's file is given; chosen by eye.
 const BACKDROP: Vec3 = Vec3::new(0.085, 0.087, 0.092);
 
@@ -294,10 +303,28 @@ impl View {
         filtering: TextureFiltering,
         progress: &Progress,
     ) -> Result<Film, Error> {
+        let samples = Samples { first: 0, count: samples_per_pixel, seed: 0 };
+        self.render_samples(scene, name, samples, filtering, progress)
+    }
+
+    /// Renders some of a pixel's samples.
+    ///
+    /// # Errors
+    /// Those of [`render`].
+    pub(crate) fn render_samples(
+        &self,
+        scene: &RenderScene,
+        name: &str,
+        samples: Samples,
+        filtering: TextureFiltering,
+        progress: &Progress,
+    ) -> Result<Film, Error> {
         let settings = Settings {
             width: self.size.0,
             height: self.size.1,
-            samples_per_pixel,
+            samples_per_pixel: samples.count,
+            first_sample: samples.first,
+            seed: samples.seed,
             filtering,
             env_samples: self.env_samples,
             shadows: self.shadows,

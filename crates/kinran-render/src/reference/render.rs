@@ -54,6 +54,11 @@ pub struct Settings {
     pub height: u32,
     /// Samples in a pixel, box-filtered; powers of two are stratified best.
     pub samples_per_pixel: u32,
+    /// The first of them, 0 to 2^20: samples n to 2n of a pixel go on where samples 0 to n ended, and the mean of both
+    /// pictures is the one of 2n samples.
+    pub first_sample: u32,
+    /// Which random numbers are drawn: pictures of different seeds have independent noise.
+    pub seed: u32,
     /// How textures are read.
     pub filtering: TextureFiltering,
     /// For every sample of a pixel, this many of the specular lobe and as many of the environment; 0 leaves
@@ -72,6 +77,8 @@ impl Default for Settings {
             width: 512,
             height: 512,
             samples_per_pixel: 16,
+            first_sample: 0,
+            seed: 0,
             filtering: TextureFiltering::Mips { max_anisotropy: 16 },
             env_samples: 1,
             shadows: true,
@@ -165,6 +172,9 @@ fn check(camera: &Camera, settings: &Settings) -> Result<(), Error> {
         let value = settings.samples_per_pixel.to_string();
         return refuse("samples_per_pixel", value, "it must be 1 to 1048576");
     }
+    if settings.first_sample > 1 << 20 {
+        return refuse("first_sample", settings.first_sample.to_string(), "it must be 0 to 1048576");
+    }
     if settings.env_samples > 1024 {
         return refuse("env_samples", settings.env_samples.to_string(), "it must be 0 to 1024");
     }
@@ -219,9 +229,9 @@ struct Sample {
 
 impl Renderer<'_> {
     fn pixel(&self, picture: &PictureCamera, x: u32, y: u32) -> Vec3 {
-        let seed = pixel_seed(x, y);
-        let count = self.settings.samples_per_pixel;
-        let sum: Vec3 = (0..count)
+        let seed = pixel_seed(x, y, self.settings.seed);
+        let (first, count) = (self.settings.first_sample, self.settings.samples_per_pixel);
+        let sum: Vec3 = (first..first + count)
             .map(|index| {
                 let place = Vec2::new(x as f32, y as f32) + sample_2d(index, PIXEL, seed);
                 self.radiance(&picture.ray(place.x, place.y), Sample { index, seed })

@@ -18,10 +18,11 @@ pub(crate) fn sample_2d(index: u32, pair: u32, seed: u32) -> Vec2 {
     vec2((x >> 8) as f32, (y >> 8) as f32) * (1.0 / 16_777_216.0)
 }
 
-/// A seed for each pixel.
+/// A seed for each pixel of a picture of seed `picture`.
 #[inline]
-pub(crate) fn pixel_seed(x: u32, y: u32) -> u32 {
-    hash(hash(x).wrapping_add(y))
+pub(crate) fn pixel_seed(x: u32, y: u32, picture: u32) -> u32 {
+    // An odd factor keeps pictures apart; another one than that of pairs, so that no picture's first pair is another's second.
+    hash(hash(x).wrapping_add(y)) ^ picture.wrapping_mul(0x85EB_CA6B)
 }
 
 /// The second dimension of Sobol's sequence, as a fraction of 2^32.
@@ -94,9 +95,15 @@ mod tests {
             let c = correlation(&base, other);
             assert!(c.abs() < 5.0 / 64.0, "{name}: correlation {c}");
         }
-        let neighbours = correlation(&|i| sample_2d(0, 0, pixel_seed(i % 64, i / 64)).x, &|i| {
-            sample_2d(0, 0, pixel_seed(i % 64 + 1, i / 64)).x
+        let neighbours = correlation(&|i| sample_2d(0, 0, pixel_seed(i % 64, i / 64, 0)).x, &|i| {
+            sample_2d(0, 0, pixel_seed(i % 64 + 1, i / 64, 0)).x
         });
         assert!(neighbours.abs() < 5.0 / 64.0, "neighbouring pixels: correlation {neighbours}");
+        for (a, b, pair) in [(0, 1, 0), (1, 2, 0), (0, 1, 1), (1, 0, 1)] {
+            let seeds = correlation(&|i| sample_2d(0, 0, pixel_seed(i % 64, i / 64, a)).x, &|i| {
+                sample_2d(0, pair, pixel_seed(i % 64, i / 64, b)).x
+            });
+            assert!(seeds.abs() < 5.0 / 64.0, "pictures {a} and {b}, pair {pair}: correlation {seeds}");
+        }
     }
 }

@@ -542,7 +542,7 @@ fn text(report: &LibraryReport) -> String {
             "format",
             "tiles",
             "opacity",
-            "mip",
+            "level",
             "count",
             "target",
             "blended",

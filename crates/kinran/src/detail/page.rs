@@ -2,6 +2,8 @@
 
 use kinran_bake::detail::ERROR_GAIN;
 
+use crate::page::level_words;
+
 use super::library::{LibraryMean, LibraryReport, LibraryRow};
 
 /// Pictures of a target, in order.
@@ -13,21 +15,6 @@ pub(super) fn picture_file(material: &str, map: &str, which: &str, picture: &str
     format!("{material}_{map}_{which}_{picture}.png")
 }
 
-/// Colours and lengths are chosen by eye.
-const STYLE: &str = "
-:root { color-scheme: dark; --paper: #15161a; --ink: #e9e7e1; --faint: #9a9aa2; --gold: #d9b46a; --line: #2b2d34; }
-body { margin: 0; background: var(--paper); color: var(--ink); font: 16px/1.5 Georgia, 'Times New Roman', serif; }
-main { max-width: 1280px; margin: 0 auto; padding: 3rem 1.5rem 5rem; }
-h1 { font-weight: normal; } h2 { font-weight: normal; color: var(--gold); margin: 3rem 0 .3rem; }
-p { max-width: 48rem; color: var(--faint); }
-table { border-collapse: collapse; font: 14px/1.5 ui-monospace, 'DejaVu Sans Mono', monospace; }
-th, td { text-align: right; padding: .25rem .8rem; border-bottom: 1px solid var(--line); font-weight: normal; }
-td { white-space: nowrap; }
-th { color: var(--faint); } .good { color: #7ed38a; } .bad { color: #e08a7a; }
-.maps { display: grid; grid-template-columns: repeat(6, 1fr); gap: .6rem; margin: .6rem 0; }
-figure { margin: 0; } figcaption { color: var(--faint); font-size: .8rem; } img { width: 100%; display: block; }
-";
-
 /// A mean as a row of cells.
 pub(super) fn cells(mean: &LibraryMean) -> [String; 13] {
     [
@@ -35,7 +22,7 @@ pub(super) fn cells(mean: &LibraryMean) -> [String; 13] {
         mean.format.clone(),
         mean.against.name().into(),
         format!("{:.2}", mean.opacity),
-        mean.level.to_string(),
+        level_words(mean.level as u32),
         mean.count.to_string(),
         format!("{:.3}", mean.target),
         format!("{:.3} ({:+.1} %)", mean.blended, 100.0 * (mean.blended / mean.target - 1.0)),
@@ -54,7 +41,7 @@ pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
         "format",
         "tiles",
         "opacity",
-        "mip",
+        "level",
         "count",
         "target alone",
         "blended",
@@ -95,27 +82,22 @@ pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
         })
         .collect();
     let size = report.size;
-    format!(
-        "<!doctype html>
-<html lang=\"en\">
-<meta charset=\"utf-8\">
-<meta name=\"viewport\" content=\"width=device-width\">
-<title>Kinran: detail maps</title>
-<style>{STYLE}</style>
-<main>
-<h1>Detail maps</h1>
+    let body = format!(
+        "<h1>Detail maps</h1>
 <p>Targets of {size} x {size} texels, painted over tiled materials and solved. Errors are root mean squares in steps of 8
-bits, for normals in degrees, of the second mip and of the first. \"own\": against the tiles the target was painted over;
+bits, for normals in degrees, at half size and as
+authored. \"own\": against the tiles the target was painted over;
 \"other\": against the nearest tile of another material; \"faded\": against that at the largest opacity with which the result is
-no worse than the compressed target. \"Magnified\": the first mip at twice its size, against the exact solution over the tiles
+no worse than the compressed target. \"Magnified\": the size as authored drawn twice as large, against the exact solution over the tiles
 as authored. Error pictures are {ERROR_GAIN} times enlarged.</p>
+<div class=\"scroll\">
 <table>
 <tr>{head}
 {means}</table>
-{sections}</main>
-</html>
-"
-    )
+</div>
+{sections}"
+    );
+    crate::page::page("Kinran: detail maps", &body)
 }
 
 fn section(row: &LibraryRow, first: bool, pictures: bool) -> String {

@@ -206,6 +206,56 @@ fn from_afar_naive_mips_are_farther_from_the_truth_than_fitted_ones() {
     ]);
     let error = |i: usize| report["methods"][i]["distances"][0]["rmse"].as_f64().unwrap();
     assert!(error(0) < 0.5 * error(1), "ml is off by {}, naive by {}", error(0), error(1));
+    let finding = &report["findings"][0];
+    assert_eq!(finding["rmse"]["best"], "ml", "{finding}");
+    assert_eq!(finding["only_noise"], false, "{finding}");
+    assert!(finding["says"].as_str().unwrap().contains("ml is nearest"), "{finding}");
+}
+
+/// Where no texture is seen from afar all filters draw the same, but for noise: the texture is magnified, and the
+/// environment's samples are few.
+#[test]
+fn filters_that_draw_the_same_get_no_mark_whatever_the_noise() {
+    let (folder, model) = square();
+    let out = folder.path().join("out");
+    for filters in ["ml,linear,lean,naive", "naive,ml"] {
+        let shared =
+            ["compare", text(&model), "-o", text(&out), "--size", "64", "--spp", "2", "--truth-spp", "4"];
+        let near = ["--distances", "1", "--fov", "2", "--distance", "0.3", "--filters", filters];
+        let args = [&shared[..], &near].concat();
+        let report = kinran_json(&args);
+        let finding = &report["findings"][0];
+        let noise = finding["noise"]["rmse"].as_f64().unwrap();
+        assert!(noise > 0.002, "there is no noise to be taken for an error: {finding}");
+        for measure in ["rmse", "flip"] {
+            assert!(finding[measure]["best"].is_null(), "{measure} marks one of {filters}: {finding}");
+        }
+        let said = kinran(&args);
+        assert!(said.out.contains("noise") && !said.out.contains('*'), "{}", said.out);
+        let told = finding["says"].as_str().unwrap();
+        assert!(told.contains("alike") || told.contains("no difference"), "{told}");
+    }
+}
+
+/// Samples are doubled where that may tell filters apart, up to the limit and no further, and the report has how many were taken.
+#[test]
+fn samples_are_doubled_up_to_the_limit_where_noise_hides_the_nearest() {
+    let (folder, model) = square();
+    let out = folder.path().join("out");
+    let shared =
+        ["compare", text(&model), "-o", text(&out), "--size", "32", "--spp", "2", "--truth-spp", "4"];
+    let taken = |most: &str| {
+        let flags = ["--distances", "1,2", "--filters", "ml,linear", "--most-truth-spp", most];
+        let report = kinran_json(&[&shared[..], &flags].concat());
+        let samples = |i: usize, what: &str| report["findings"][i][what].as_u64().unwrap();
+        [0, 1].map(|i| (samples(i, "samples_per_pixel"), samples(i, "truth_samples_per_pixel")))
+    };
+    assert_eq!(taken("4"), [(2, 4), (4, 8)]);
+    let more = taken("64");
+    for (i, (filters, truth)) in more.into_iter().enumerate() {
+        let first = 4 << i;
+        assert!(truth % first == 0 && (first..=64 << i).contains(&truth) && filters * 2 == truth, "{more:?}");
+    }
 }
 
 /// A picture of a model or a folder from far away, where mips matter.
