@@ -20,10 +20,10 @@ use serde::Serialize;
 use crate::backend::{Backend, Painter};
 use crate::demo::noise::noise;
 use crate::model::Model;
-use crate::picture::{INK, PAPER, Picture};
+use crate::picture::{Picture, Row, grid};
 use crate::surfaces::{Mips, fuzz_fits, scene_surfaces};
 use crate::values::{number, vector};
-use crate::view::{View, ViewArgs, file_name};
+use crate::view::{EnvironmentChoice, View, ViewArgs, file_name};
 use crate::{Console, Error, Progress, outputs};
 
 /// Draws a model with fuzz, a sheet of pictures for each parameter
@@ -32,10 +32,14 @@ use crate::{Console, Error, Progress, outputs};
 /// saturation of the fibres' colour, light (one light moving round; harmonics alone; the environment alone), probe (the
 /// environment in a smooth metal base, attenuated or not), simple (the form for seven bits of a G-buffer, off and on), and,
 /// where it is named, realtime (both renderers' pictures and FLIP, their mean difference, in direct light and in that of
-/// the environment, the layer lit along its lobe or as the talk has it). Every material gets the same fibres.
+/// the environment, the layer lit along its lobe or as the talk has it). Every material gets the same fibres, over a dark base.
+///
+/// Without --light, an --env of a file or lights in the model, parameters are seen in three lights that show the fibres best and
+/// have no noise: from the front left, and from behind on both sides.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  kinran fuzz horse.gltf -o horse_fuzz/ --base 0.05,0.004,0.008 --roughness 0.7 --color 0.9,0.25,0.3
+  kinran fuzz horse.gltf -o horse_fuzz/
+  kinran fuzz sofa.gltf -o sofa_fuzz/ --base own --color 0.9,0.85,0.8
   kinran fuzz curtain.gltf -o crushed/ --direction swirl --spread 0.1 --tilt 50 --color 0.5,0.05,0.1 --sheet light
   kinran fuzz sofa.gltf -o felt/ --sheet simple --backend gpu
   kinran fuzz horse.gltf -o both/ --sheet realtime --spp 256 --size 128x128")]
@@ -65,19 +69,20 @@ pub struct Args {
     pub tilt: f32,
 
     /// Linear albedo of the fibres, each 0 to 1
-    #[arg(long, value_name = "R,G,B", default_value = "0.8,0.75,0.7", value_parser = vector)]
+    #[arg(long, value_name = "R,G,B", default_value = "0.95,0.35,0.42", value_parser = vector)]
     pub color: Vec3,
 
-    /// Linear colour of the base under the fibres, in the place of the file's: velvet shows on a dark one
-    #[arg(long, value_name = "R,G,B", value_parser = vector)]
-    pub base: Option<Vec3>,
+    /// Linear colour of the base under the fibres: velvet shows on a dark one. `own` leaves colour and roughness as the file
+    /// has them
+    #[arg(long, value_name = "R,G,B|own", default_value = "0.03,0.006,0.01")]
+    pub base: Base,
 
-    /// Roughness of the base, in the place of the file's, which is no metal then
+    /// Roughness of the base, which is no metal then [default: 0.8, the file's for --base own]
     #[arg(long, value_name = "R", value_parser = |t: &str| number(t, 0.0..=1.0))]
     pub roughness: Option<f32>,
 
     /// Where fibres lean: as they do in the tangent frame, in noise, or in swirls
-    #[arg(long, value_enum, default_value_t = Direction::Noise)]
+    #[arg(long, value_enum, default_value_t = Direction::Even)]
     pub direction: Direction,
 
     /// What draws: the reference renderer on the CPU, or a GPU by Vulkan
@@ -109,6 +114,26 @@ pub enum Sheet {
     Realtime,
 }
 
+/// What lies under the fibres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Base {
+    /// The model's materials as they are.
+    Own,
+    /// A linear colour.
+    Color(Vec3),
+}
+
+impl std::str::FromStr for Base {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "own" => Ok(Base::Own),
+            color => vector(color).map(Base::Color).map_err(|e| format!("write own or R,G,B; {e}")),
+        }
+    }
+}
+
 /// A direction map made here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Direction {
@@ -120,12 +145,14 @@ pub enum Direction {
     Swirl,
 }
 
-/// Pixels between pictures and for a line of words; chosen by eye.
-const GAP: u32 = 10;
-const LABEL: u32 = 26;
+/// Roughness of a base whose colour is given; chosen by eye.
+const BASE_ROUGHNESS: f32 = 0.8;
 
-/// Pixels of a letter in a label, no less.
-const LETTER: u32 = 10;
+/// Lights that parameters are seen in: directions in the camera's frame (right, up, back); chosen by eye.
+const LIGHTS: [Vec3; 3] = [vec3(-0.6, 0.6, 0.7), vec3(0.9, 0.5, -0.6), vec3(-0.8, 0.2, -0.8)];
+
+/// How many times as bright as the lights of flags each of them is, for dark cloth; chosen by eye.
+const BRIGHTNESS: f32 = 4.0;
 
 #[derive(Serialize)]
 struct Summary {
@@ -148,7 +175,11 @@ struct Difference {
 /// One that names the flag or the file.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     outputs::check_folder(&args.output)?;
-    for (flag, color) in [("--color", Some(args.color)), ("--base", args.base)] {
+    let (base, roughness) = match args.base {
+        Base::Own => (None, args.roughness),
+        Base::Color(color) => (Some(color), Some(args.roughness.unwrap_or(BASE_ROUGHNESS))),
+    };
+    for (flag, color) in [("--color", Some(args.color)), ("--base", base)] {
         if let Some(Vec3 { x, y, z }) = color.filter(|c| c.min_element() < 0.0 || c.max_element() > 1.0) {
             return Err(Error::Usage(format!("{flag} {x},{y},{z}: each must lie in 0 to 1")));
         }
@@ -164,11 +195,11 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     };
     let Model { path, mut scene, only_baked } = Model::open(&args.file)?;
     for material in &mut scene.materials {
-        if let Some(base) = args.base {
+        if let Some(base) = base {
             material.base_color_factor = base.extend(material.base_color_factor.w);
             material.base_color = None;
         }
-        if let Some(roughness) = args.roughness {
+        if let Some(roughness) = roughness {
             (material.metallic_factor, material.roughness_factor) = (0.0, roughness);
             material.metallic_roughness = None;
         }
@@ -181,7 +212,16 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let left_out = painter.left_out(&view, &prepared);
     let warnings: Vec<String> = scene.warnings.iter().cloned().chain(apart).chain(left_out).collect();
     warnings.iter().for_each(|w| console.warn(w));
-    let studio = Studio { args, prepared, view, painter, progress: &progress };
+    let plain = args.view.light.is_empty()
+        && scene.lights.is_empty()
+        && matches!(args.view.env, EnvironmentChoice::Studio);
+    let parameters = if plain {
+        let lights = LIGHTS.map(|direction| light(&view, direction, BRIGHTNESS));
+        View { lights: lights.into(), environment: None, ..view.clone() }
+    } else {
+        view.clone()
+    };
+    let studio = Studio { args, prepared, view, parameters, painter, progress: &progress };
 
     std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
     let mut text = String::new();
@@ -221,6 +261,8 @@ struct Studio<'a> {
     args: &'a Args,
     prepared: RenderScene,
     view: View,
+    /// What parameters are seen in.
+    parameters: View,
     painter: Painter,
     progress: &'a Progress,
 }
@@ -237,13 +279,14 @@ impl Studio<'_> {
     }
 
     fn shot(&self, name: impl Into<String>, fuzz: Option<Fuzz>) -> Shot {
-        Shot { name: name.into(), fuzz, view: self.view.clone(), gloss: false, talk_ambient: false }
+        Shot { name: name.into(), fuzz, view: self.parameters.clone(), gloss: false, talk_ambient: false }
     }
 
     fn shots(&self, sheet: Sheet) -> Vec<Shot> {
         let base = self.layer();
         let vary = |name: &str, values: [f32; 6], change: &dyn Fn(f32) -> FuzzLayer| -> Vec<_> {
-            let shot = |x| self.shot(format!("{name} {x}"), Some(Fuzz::Layer(change(x))));
+            let unit = if sheet == Sheet::Tilt { "°" } else { "" };
+            let shot = |x| self.shot(format!("{name} {x}{unit}"), Some(Fuzz::Layer(change(x))));
             values.into_iter().map(shot).collect()
         };
         let attenuations = || -> Vec<_> {
@@ -259,14 +302,14 @@ impl Studio<'_> {
         };
         match sheet {
             Sheet::Attenuation => attenuations(),
-            Sheet::Density => vary("density", [0.0, 0.1, 0.2, 0.3, 0.4, 0.5], &|density| FuzzLayer {
+            Sheet::Density => vary("density", [0.0, 0.05, 0.12, 0.3, 0.7, 1.5], &|density| FuzzLayer {
                 density,
                 ..base.clone()
             }),
             Sheet::Spread => {
-                vary("spread", [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], &|spread| FuzzLayer { spread, ..base.clone() })
+                vary("spread", [0.0, 0.1, 0.2, 0.4, 0.7, 1.0], &|spread| FuzzLayer { spread, ..base.clone() })
             }
-            Sheet::Tilt => vary("tilt", [0.0, 18.0, 36.0, 54.0, 72.0, 90.0], &|tilt: f32| FuzzLayer {
+            Sheet::Tilt => vary("tilt", [0.0, 30.0, 45.0, 60.0, 75.0, 90.0], &|tilt: f32| FuzzLayer {
                 tilt: tilt.to_radians(),
                 ..base.clone()
             }),
@@ -299,9 +342,9 @@ impl Studio<'_> {
     }
 
     fn sheet(&self, sheet: Sheet) -> Result<Picture, Error> {
-        let draw = |shot: Shot| Ok((self.draw(&self.painter, &shot)?, shot.name));
+        let draw = |shot: Shot| Ok((shot.name.clone(), self.draw(&self.painter, &shot)?));
         let pictures: Result<Vec<_>, Error> = self.shots(sheet).into_iter().map(draw).collect();
-        Ok(self.framed(&pictures?))
+        Ok(grid(&[Row { name: String::new(), cells: pictures? }]))
     }
 
     /// Both renderers: in direct light; in that of the environment, the layer lit along its lobe or as the talk has it.
@@ -332,30 +375,16 @@ impl Studio<'_> {
                     _ => light,
                 };
                 differences.push(Difference { light, flip });
-                pictures.push((picture, format!("{name}: FLIP {flip:.4}")));
+                pictures.push((format!("{name}: FLIP {flip:.4}"), picture));
             }
             let at = pictures.len() - drawn.len();
-            pictures.insert(at, (reference, format!("{light}, reference")));
+            pictures.insert(at, (format!("{light}, reference"), reference));
         }
         if differences.is_empty() {
             let fix = "leave --env none out, or give --light X,Y,Z";
             return Err(Error::Usage(format!("--sheet realtime: no light to compare in; {fix}")));
         }
-        Ok((self.framed(&pictures), differences))
-    }
-
-    /// Pictures under their labels, side by side.
-    fn framed(&self, pictures: &[(Picture, String)]) -> Picture {
-        let (width, height) = self.view.size;
-        let longest = pictures.iter().map(|(_, name)| name.chars().count() as u32).max().unwrap_or(0);
-        let step = GAP + width.max(LETTER * longest);
-        let mut picture = Picture::new(GAP + step * pictures.len() as u32, LABEL + height + GAP, PAPER);
-        for (i, (drawn, name)) in pictures.iter().enumerate() {
-            let x = GAP + step * i as u32;
-            picture.text((x, 18), 15.0, INK, name);
-            picture.draw(x, LABEL, drawn);
-        }
-        picture
+        Ok((grid(&[Row { name: String::new(), cells: pictures }]), differences))
     }
 
     fn draw(&self, painter: &Painter, shot: &Shot) -> Result<Picture, Error> {
@@ -395,17 +424,10 @@ impl Studio<'_> {
             .into_iter()
             .map(|degrees| {
                 let a = degrees.to_radians();
-                let camera = self.view.camera.transform;
-                let to_light = camera.transform_vector3(vec3(a.sin(), 0.5, a.cos())).normalize();
-                let light = Light {
-                    kind: LightKind::Directional,
-                    color: Vec3::splat(std::f32::consts::PI),
-                    position: Vec3::ZERO,
-                    direction: -to_light,
-                    range: f32::INFINITY,
-                };
+                let light = light(&self.view, vec3(a.sin(), 0.5, a.cos()), BRIGHTNESS);
+                let side = if degrees < 0.0 { "left" } else { "right" };
                 (
-                    format!("light at {degrees}°"),
+                    format!("light {}° {side}", degrees.abs()),
                     View { lights: vec![light], environment: None, ..self.view.clone() },
                 )
             })
@@ -419,6 +441,17 @@ impl Studio<'_> {
             }
         }
         views
+    }
+}
+
+/// A light from a direction in the camera's frame, so many times as bright as those of flags.
+fn light(view: &View, direction: Vec3, brightness: f32) -> Light {
+    Light {
+        kind: LightKind::Directional,
+        color: Vec3::splat(brightness * std::f32::consts::PI),
+        position: Vec3::ZERO,
+        direction: -view.camera.transform.transform_vector3(direction).normalize(),
+        range: f32::INFINITY,
     }
 }
 

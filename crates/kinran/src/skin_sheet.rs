@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::ValueEnum;
-use glam::{Vec2, Vec3, Vec4, vec2, vec3};
+use glam::{Mat3, Vec2, Vec3, Vec4, vec2, vec3};
 use kinran_bake::aniso::Filter;
 use kinran_bake::curvature::{BLUR, Mesh, Options, bake_curvature, estimated_normals, principal};
 use kinran_bake::skin_lut::{Profile, Table, punctual_table};
@@ -19,7 +19,7 @@ use kinran_shading::skin::profile::Gaussian;
 use serde::Serialize;
 
 use crate::bake::curvature::{Blur, Joined, MethodName, deviations, meshes, unit};
-use crate::picture::{Color, INK, PAPER, Picture};
+use crate::picture::{Color, INK, PAPER, Picture, Row, grid};
 use crate::skin::{SIZE, profile, skin_table};
 use crate::skin_lut::plot::plot;
 use crate::surfaces::{Mips, scene_surfaces};
@@ -29,14 +29,16 @@ use crate::{Console, Error, Progress, outputs};
 
 /// Draws a model as skin, a sheet of pictures for each choice
 ///
-/// Sheets: turn (zero, mean and directional curvature under a light that goes round), curvature (in false colour, beside
-/// the picture and over the table of punctual light), profiles (the radial profile on the ring, which is wrong, beside the
-/// linear one, and four times their difference), shadows (hard, filtered, and with light scattering into penumbras),
-/// normals (of the map for all channels, blurred by channel, of the mesh), tensors (directions of the larger curvature as
-/// short lines).
+/// Sheets: turn (zero, mean and directional curvature under a light that goes round without shadows, and what direction changes), curvature
+/// (in false colour, beside the picture and over the table of punctual light), profiles (the radial profile on the ring,
+/// which is wrong, beside the linear one, and their difference enlarged), shadows (hard, filtered, and with light scattering
+/// into penumbras), normals (of the map for all channels, blurred by channel, of the mesh), tensors (directions of the larger
+/// curvature as short lines).
 ///
-/// Every material is taken for skin unless the file marks some. Curvature is that of the file, or baked in memory where it
-/// has none, of smooth normals where it has none of those either.
+/// Pictures show the part of the model where curvature depends most on direction, such as a face or fingers; --whole,
+/// --crop, --camera or --distance show another one. Every material is taken for skin unless the file marks some, and has the
+/// colour of skin where the file gives none. Curvature is that of the file, or baked in memory where it has none, of smooth
+/// normals where it has none of those either.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran skin head.gltf -o head/ --unit-mm 50
@@ -62,6 +64,10 @@ pub struct Args {
     /// Millimetres in a unit of the file's meshes; the default is a metre times the nodes' scale
     #[arg(long, value_name = "MM", value_parser = |t: &str| number(t, 1e-6..=1e9))]
     pub unit_mm: Option<f32>,
+
+    /// Shows the whole model
+    #[arg(long, conflicts_with = "crop")]
+    pub whole: bool,
 
     /// Shows this part of every picture: left, top, width and height, of 0 to 1
     #[arg(long, value_name = "X,Y,W,H", value_parser = part)]
@@ -106,9 +112,24 @@ pub enum Sheet {
     Tensors,
 }
 
-/// Pixels between pictures and for a line of words; chosen by eye.
-const GAP: u32 = 10;
-const LABEL: u32 = 26;
+/// Linear colour of skin of which the file says nothing; chosen by eye.
+const SKIN_COLOR: Vec3 = vec3(0.75, 0.48, 0.38);
+
+/// How many times as bright as the lights of flags the sheets' own are, since most of what they show is at grazing light;
+/// chosen by eye.
+const BRIGHTNESS: f32 = 2.0;
+
+/// Roughness of such skin; chosen by eye.
+const SKIN_ROUGHNESS: f32 = 0.5;
+
+/// Where the light of the turn sheet stands, degrees round the camera's view to the right: low enough on both sides that
+/// shadows end on what the camera sees; chosen by eye.
+const TURN: [(&str, f32); 4] = [
+    ("light behind left", -110.0),
+    ("light from the left", -70.0),
+    ("light from the right", 70.0),
+    ("light behind right", 110.0),
+];
 
 /// Pixels between the tensors' lines.
 const SPACING: u32 = 9;
@@ -136,16 +157,26 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let progress = console.progress();
     bake(args, &mut scene, &progress, &mut warnings)?;
 
-    let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
+    let mut view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
     let (surfaces, apart) = scene_surfaces(&scene, Mips::Filtered(Filter::Linear), &progress)?;
     warnings.extend(apart);
     warnings.iter().for_each(|w| console.warn(w));
     let mut prepared = view.scene(&scene, surfaces)?;
-    if let Some(base) = args.base {
-        for material in &mut prepared.materials {
+    // An .obj has no colours, and white is what a glTF that says nothing gives.
+    let colorless = outputs::has_extension(&args.file, "obj");
+    for material in &mut prepared.materials {
+        let white = material.base_color.is_none() && material.base_color_factor.truncate() == Vec3::ONE;
+        let unsaid = colorless || white;
+        if let Some(base) = args.base.or_else(|| unsaid.then_some(SKIN_COLOR)) {
             material.base_color_factor = base.extend(material.base_color_factor.w);
             material.base_color = None;
+            if unsaid {
+                (material.metallic_factor, material.roughness_factor) = (0.0, SKIN_ROUGHNESS);
+            }
         }
+    }
+    if !args.whole && args.crop.is_none() && args.view.camera.is_none() && args.view.distance == 1.0 {
+        approach(&mut view, &prepared);
     }
     let studio = Studio { args, scene: &scene, prepared, view, progress: &progress };
 
@@ -160,6 +191,66 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let text =
         format!("{} sheets of {} are in {}", files.len(), file_name(&args.file), args.output.display());
     console.result(&Summary { files, warnings }, &text)
+}
+
+/// What the camera sees at a point of the picture.
+fn seen(scene: &RenderScene, camera: &PictureCamera, at: Vec2) -> Option<(SurfacePoint, Vec3)> {
+    let ray = camera.ray(at.x, at.y);
+    let hit = scene.geometry.bvh().closest_hit(ray.origin, ray.direction, 0.0, f32::INFINITY)?;
+    Some((scene.geometry.surface_point(&hit, &ray), -ray.direction))
+}
+
+/// Moves the camera to the part of the picture, two fifths of its width and height, where principal curvatures differ most: there mean and
+/// directional curvature are seen to differ.
+fn approach(view: &mut View, scene: &RenderScene) {
+    const SHARE: f32 = 0.4;
+    /// Rays along the picture's shorter side, and the step between parts that are tried.
+    const RAYS: u32 = 96;
+    const STEP: usize = 4;
+    /// What is beyond this share of the range counts no more: tips and edges are no reason to look at them.
+    const ENOUGH: f32 = 0.2;
+    let shorter = view.size.0.min(view.size.1);
+    let [columns, rows] = [view.size.0, view.size.1].map(|side| (side * RAYS / shorter).max(8));
+    let camera = PictureCamera::new(&view.camera, columns, rows);
+    let range = scene.geometry.curvature_range();
+    let points: Vec<Option<(f32, Vec3)>> = (0..columns * rows)
+        .map(|i| {
+            let at = vec2((i % columns) as f32 + 0.5, (i / columns) as f32 + 0.5);
+            let (point, _) = seen(scene, &camera, at)?;
+            let (larger, smaller, _) = principal(curvature_decode(point.curvature, range).0);
+            Some(((larger - smaller).min(ENOUGH * range), point.position))
+        })
+        .collect();
+    let [wide, high] = [columns, rows].map(|side| (SHARE * side as f32) as usize);
+    let inside = |left: usize, top: usize| {
+        let row = move |y: usize| y * columns as usize + left;
+        let points = &points;
+        (top..top + high).flat_map(move |y| points[row(y)..row(y) + wide].iter().flatten())
+    };
+    let places = (0..=rows as usize - high)
+        .step_by(STEP)
+        .flat_map(|top| (0..=columns as usize - wide).step_by(STEP).map(move |left| (left, top)));
+    let weight = |&(left, top): &(usize, usize)| inside(left, top).map(|(weight, _)| weight).sum::<f32>();
+    let Some((left, top)) = places.max_by(|a, b| weight(a).total_cmp(&weight(b))) else { return };
+    let (sum, count) = inside(left, top).fold((Vec3::ZERO, 0u32), |(sum, n), (_, p)| (sum + p, n + 1));
+    if count == 0 {
+        return;
+    }
+    // The new axis goes through the middle of the part, at the mean depth of what is seen in it.
+    let camera = &mut view.camera;
+    let eye = Vec3::from(camera.transform.translation);
+    let (right, up, back) = {
+        let m = Mat3::from(camera.transform.matrix3);
+        (m.x_axis, m.y_axis, m.z_axis)
+    };
+    let depth = (eye - sum / count as f32).dot(back);
+    let tangent = (0.5 * camera.yfov).tan();
+    let aspect = columns as f32 / rows as f32;
+    let x = (left + wide / 2) as f32 / columns as f32 * 2.0 - 1.0;
+    let y = 1.0 - (top + high / 2) as f32 / rows as f32 * 2.0;
+    let middle = eye - depth * back + depth * tangent * (x * aspect * right + y * up);
+    camera.transform.translation = (middle + SHARE * depth * back).into();
+    view.middle = middle;
 }
 
 /// Gives meshes without curvature some, as `kinran bake` would write it.
@@ -248,31 +339,47 @@ impl Studio<'_> {
             Sheet::Shadows => self.shadows(),
             Sheet::Normals => self.normals(),
             Sheet::Tensors => {
-                Ok(self.rows(&[vec![("directions of the larger curvature".into(), self.tensors())]]))
+                Ok(self.row(vec![("directions of the larger curvature".into(), self.tensors())]))
             }
         }
     }
 
-    /// Zero, mean and directional curvature, each under a light from several sides.
+    /// Zero, mean and directional curvature, each under a light from several sides, and what the last two differ by.
     fn turn(&self) -> Result<Picture, Error> {
-        let rows_of: Result<Vec<_>, Error> = [
-            ("zero", SkinCurvature::Zero),
-            ("mean", SkinCurvature::Mean),
-            ("directional", SkinCurvature::Directional),
-        ]
-        .into_iter()
-        .map(|(name, curvature)| {
-            [-105.0f32, -75.0, -35.0, 35.0, 75.0, 105.0]
-                .into_iter()
-                .map(|degrees| {
-                    let label = format!("{name}, light at {degrees}°");
-                    let picture = self.lit(&label, &self.around(degrees), |skin| skin.curvature = curvature);
-                    Ok((label, picture?))
+        let drawn = [SkinCurvature::Zero, SkinCurvature::Mean, SkinCurvature::Directional].map(|curvature| {
+            TURN.map(|(_, degrees)| {
+                // Without shadows, which hide where light ends by curvature.
+                let view = View { shadows: false, ..self.view.clone() };
+                let mut scene = self.prepared.clone();
+                scene
+                    .materials
+                    .iter_mut()
+                    .filter_map(|m| m.skin.as_mut())
+                    .for_each(|s| s.curvature = curvature);
+                self.draw_in(&view, "turn", &scene, &self.around(degrees))
+            })
+        });
+        let mut pictures: Vec<Vec<Picture>> = Vec::new();
+        for row in drawn {
+            pictures.push(row.into_iter().collect::<Result<_, Error>>()?);
+        }
+        let (apart, gain) = enlarged_differences(&pictures[1], &pictures[2]);
+        pictures.push(apart);
+        let names = [
+            "zero: light does not scatter".to_owned(),
+            "mean curvature: light scatters alike in all directions".into(),
+            "directional curvature: most across ridges, hardly along them".into(),
+            format!("what direction changes, {gain} times enlarged"),
+        ];
+        let rows = names.into_iter().zip(pictures).enumerate().map(|(i, (name, pictures))| Row {
+            name,
+            cells: (TURN.iter().zip(pictures))
+                .map(|(&(label, _), picture)| {
+                    (if i == 0 { label.to_owned() } else { String::new() }, picture)
                 })
-                .collect()
-        })
-        .collect();
-        Ok(self.rows(&rows_of?))
+                .collect(),
+        });
+        Ok(self.rows(rows.collect()))
     }
 
     /// The picture, curvatures in false colour, and the table.
@@ -286,7 +393,7 @@ impl Studio<'_> {
             ("larger principal".to_owned(), self.colored(|t, _| color(principal(t).0))),
             ("smaller principal".to_owned(), self.colored(|t, _| color(principal(t).1.max(0.0)))),
         ];
-        let pictures = self.rows(&[row]);
+        let pictures = self.row(row);
         let skin = self.skin()?;
         let table = |t: &kinran_render::reference::SkinTable| Table {
             width: t.width,
@@ -298,19 +405,19 @@ impl Studio<'_> {
             plot(&title, &table(&skin.tables.punctual), &table(&skin.tables.ambient), skin.tables.range);
 
         // A scale between both.
-        const SCALE: u32 = 46;
+        const SCALE: u32 = 52;
         let width = pictures.width.max(below.width);
         let mut sheet = Picture::new(width, pictures.height + SCALE + below.height, PAPER);
         sheet.draw(0, 0, &pictures);
-        let (left, length) = (GAP + 190, 420);
-        sheet.text((GAP, pictures.height + 18), 15.0, INK, "curvature, 1/mm");
+        let (left, length) = (220, 420);
+        sheet.text((10, pictures.height + 20), 20.0, INK, "curvature, 1/mm");
         for x in 0..length {
             let color = false_color(x as f32 / (length - 1) as f32);
             sheet.draw(left + x, pictures.height + 6, &Picture::new(1, 14, color));
         }
         for i in 0..=4 {
             let label = format!("{:.3}", range * (i as f32 / 4.0).powi(2));
-            sheet.text((left + i * (length - 1) / 4 - 16, pictures.height + 36), 13.0, INK, &label);
+            sheet.text((left + i * (length - 1) / 4 - 20, pictures.height + 42), 17.0, INK, &label);
         }
         sheet.draw(0, pictures.height + SCALE, &below);
         Ok(sheet)
@@ -336,7 +443,7 @@ impl Studio<'_> {
             let divide = |g: &Gaussian| Gaussian { weight: g.weight.map(|w| w / g.variance.sqrt()), ..*g };
             wrong.push(Some(Profile::Gaussians(sum.iter().map(divide).collect())));
         }
-        let mut rows_of = Vec::new();
+        let (mut wrongs, mut rights) = (Vec::new(), Vec::new());
         for degrees in [-80.0, 100.0] {
             let light = self.around(degrees);
             let mut swapped = self.prepared.clone();
@@ -348,19 +455,19 @@ impl Studio<'_> {
                 tables.punctual = skin_table(punctual_table(radial, SIZE.0, SIZE.1, range));
                 skin.tables = Arc::new(tables);
             }
-            let wrong = self.draw("radial", &swapped, &light)?;
-            let right = self.draw("linear", &self.prepared, &light)?;
-            let apart = wrong.pixels.iter().zip(&right.pixels);
-            let apart =
-                apart.map(|(a, b)| [0, 1, 2].map(|c| a[c].abs_diff(b[c]).saturating_mul(4))).collect();
-            let apart = Picture { pixels: apart, ..wrong };
-            rows_of.push(vec![
+            wrongs.push(self.draw("radial", &swapped, &light)?);
+            rights.push(self.draw("linear", &self.prepared, &light)?);
+        }
+        let (apart, gain) = enlarged_differences(&wrongs, &rights);
+        let rows = wrongs.into_iter().zip(rights).zip(apart).map(|((wrong, right), apart)| Row {
+            name: String::new(),
+            cells: vec![
                 ("radial profile on the ring (wrong)".to_owned(), wrong),
                 ("linear profile (right)".to_owned(), right),
-                ("four times the difference".to_owned(), apart),
-            ]);
-        }
-        Ok(self.rows(&rows_of))
+                (format!("difference, {gain} times enlarged"), apart),
+            ],
+        });
+        Ok(self.rows(rows.collect()))
     }
 
     /// Shadows as rays cast them, filtered, and with light that scatters into them.
@@ -377,11 +484,11 @@ impl Studio<'_> {
             });
         };
         let light = self.towards(vec3(-0.6, 0.9, 0.45));
-        Ok(self.rows(&[vec![
+        Ok(self.row(vec![
             ("hard shadows".into(), self.lit("hard", &light, |skin| skin.penumbra = 0.0)?),
             (format!("filtered over {width} mm"), self.lit("filtered", &light, plain)?),
             ("light scatters in them".into(), self.lit("scattered", &light, |skin| skin.penumbra = width)?),
-        ]]))
+        ]))
     }
 
     /// Normals of the map, by channel, and of the mesh.
@@ -389,32 +496,29 @@ impl Studio<'_> {
         self.skin()?;
         let light = self.side();
         let shot = |name: &str, blur: Vec3| self.lit(name, &light, |skin| skin.normal_blur = blur);
-        Ok(self.rows(&[vec![
+        Ok(self.row(vec![
             ("normals of the map".into(), shot("map", Vec3::ZERO)?),
             ("blurred by channel".into(), shot("profile", SKIN_NORMAL_BLUR)?),
             ("normals of the mesh".into(), shot("mesh", Vec3::ONE)?),
-        ]]))
+        ]))
+    }
+
+    /// One row of pictures under their labels.
+    fn row(&self, cells: Vec<(String, Picture)>) -> Picture {
+        self.rows(vec![Row { name: String::new(), cells }])
     }
 
     /// Pictures under their labels, row by row, cut to what is shown of them.
-    fn rows(&self, rows: &[Vec<(String, Picture)>]) -> Picture {
+    fn rows(&self, mut rows: Vec<Row>) -> Picture {
         let [x, y, w, h] = self.args.crop.unwrap_or([0.0, 0.0, 1.0, 1.0]);
         let of = |share: f32, side: u32| (share * side as f32).round() as u32;
         let (full_width, full_height) = self.view.size;
         let (left, top) = (of(x, full_width), of(y, full_height));
         let (width, height) = (of(w, full_width).max(1), of(h, full_height).max(1));
-        let columns = rows.iter().map(Vec::len).max().unwrap_or(0) as u32;
-        let mut sheet =
-            Picture::new(GAP + (width + GAP) * columns, (LABEL + height) * rows.len() as u32 + GAP, PAPER);
-        for (j, row) in rows.iter().enumerate() {
-            let below = (LABEL + height) * j as u32;
-            for (i, (name, picture)) in row.iter().enumerate() {
-                let beside = GAP + (width + GAP) * i as u32;
-                sheet.text((beside, below + 18), 15.0, INK, name);
-                sheet.draw(beside, below + LABEL, &picture.part(left, top, width, height));
-            }
+        for (_, picture) in rows.iter_mut().flat_map(|row| &mut row.cells) {
+            *picture = picture.part(left, top, width, height);
         }
-        sheet
+        grid(&rows)
     }
 
     /// Skin of the first material that is some.
@@ -439,7 +543,7 @@ impl Studio<'_> {
         let to_light = self.view.camera.transform.transform_vector3(direction).normalize();
         vec![Light {
             kind: LightKind::Directional,
-            color: Vec3::splat(std::f32::consts::PI),
+            color: Vec3::splat(BRIGHTNESS * std::f32::consts::PI),
             position: Vec3::ZERO,
             direction: -to_light,
             range: f32::INFINITY,
@@ -455,19 +559,22 @@ impl Studio<'_> {
 
     /// A picture in the light of `lights` alone.
     fn draw(&self, name: &str, scene: &RenderScene, lights: &[Light]) -> Result<Picture, Error> {
+        self.draw_in(&self.view, name, scene, lights)
+    }
+
+    fn draw_in(
+        &self,
+        view: &View,
+        name: &str,
+        scene: &RenderScene,
+        lights: &[Light],
+    ) -> Result<Picture, Error> {
         let mut scene = scene.clone();
         scene.lights = lights.to_vec();
         scene.surroundings = None;
         let filtering = TextureFiltering::Mips { max_anisotropy: 16 };
-        let film = self.view.render(&scene, name, self.args.spp, filtering, self.progress)?;
-        Ok(Picture { width: film.width, height: film.height, pixels: self.view.display(&film) })
-    }
-
-    /// What the camera sees at a point of the picture.
-    fn seen(&self, camera: &PictureCamera, at: Vec2) -> Option<(SurfacePoint, Vec3)> {
-        let ray = camera.ray(at.x, at.y);
-        let hit = self.prepared.geometry.bvh().closest_hit(ray.origin, ray.direction, 0.0, f32::INFINITY)?;
-        Some((self.prepared.geometry.surface_point(&hit, &ray), -ray.direction))
+        let film = view.render(&scene, name, self.args.spp, filtering, self.progress)?;
+        Ok(Picture { width: film.width, height: film.height, pixels: view.display(&film) })
     }
 
     /// Tensor and mean curvature as display colours, four samples a pixel.
@@ -479,7 +586,7 @@ impl Studio<'_> {
         for (i, pixel) in picture.pixels.iter_mut().enumerate() {
             let corner = vec2((i as u32 % width) as f32, (i as u32 / width) as f32);
             let samples = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)].map(|(x, y)| {
-                match self.seen(&camera, corner + vec2(x, y)) {
+                match seen(&self.prepared, &camera, corner + vec2(x, y)) {
                     Some((point, _)) => {
                         let (tensor, mean) = curvature_decode(point.curvature, range);
                         color(tensor, mean)
@@ -502,7 +609,7 @@ impl Studio<'_> {
         let mut picture = Picture::new(width, height, BACKDROP);
         for (i, pixel) in picture.pixels.iter_mut().enumerate() {
             let at = vec2((i as u32 % width) as f32 + 0.5, (i as u32 / width) as f32 + 0.5);
-            if let Some((point, view)) = self.seen(&camera, at) {
+            if let Some((point, view)) = seen(&self.prepared, &camera, at) {
                 let facing = point.tangent_frame.z_axis.normalize_or_zero().dot(view).max(0.0);
                 *pixel = [(38.0 + 60.0 * facing) as u8; 3];
             }
@@ -517,7 +624,9 @@ impl Studio<'_> {
             // Every other row is shifted, so that lines stand in no columns.
             let shift = if (y / SPACING).is_multiple_of(2) { SPACING / 4 } else { 3 * SPACING / 4 };
             for x in (shift..width).step_by(SPACING as usize) {
-                let Some((point, view)) = self.seen(&camera, vec2(x as f32, y as f32)) else { continue };
+                let Some((point, view)) = seen(&self.prepared, &camera, vec2(x as f32, y as f32)) else {
+                    continue;
+                };
                 let (larger, smaller, [along, across]) =
                     principal(curvature_decode(point.curvature, range).0);
                 if larger < 0.005 * range {
@@ -537,6 +646,25 @@ impl Studio<'_> {
         }
         picture
     }
+}
+
+/// Differences of pictures, all enlarged so many times: by the power of two at which the largest one but a few is not yet white.
+fn enlarged_differences(a: &[Picture], b: &[Picture]) -> (Vec<Picture>, u32) {
+    let apart = |a: &Picture, b: &Picture| -> Vec<Color> {
+        a.pixels.iter().zip(&b.pixels).map(|(a, b)| [0, 1, 2].map(|c| a[c].abs_diff(b[c]))).collect()
+    };
+    let apart: Vec<Vec<Color>> = a.iter().zip(b).map(|(a, b)| apart(a, b)).collect();
+    let mut largest: Vec<u8> = apart.iter().flatten().map(|c| c[0].max(c[1]).max(c[2])).collect();
+    largest.sort_unstable();
+    let most = u32::from(largest.get(largest.len() * 998 / 1000).copied().unwrap_or(255)).max(1);
+    let gain = [1, 2, 4, 8, 16, 32].into_iter().rev().find(|gain| gain * most <= 255).unwrap_or(1);
+    let enlarge = |c: u8| (u32::from(c) * gain).min(255) as u8;
+    let pictures = a.iter().zip(apart).map(|(a, apart)| Picture {
+        width: a.width,
+        height: a.height,
+        pixels: apart.into_iter().map(|color| color.map(enlarge)).collect(),
+    });
+    (pictures.collect(), gain)
 }
 
 /// Behind curvature; chosen by eye.

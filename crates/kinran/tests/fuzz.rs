@@ -402,7 +402,11 @@ mod realtime {
         let Some(assets) = sample_assets() else { return };
         let velvet = "--density 0.5 --spread 0.1 --tilt 50 --direction swirl --color 0.5,0.05,0.1";
         for (what, model, fibres) in [
-            ("velvety horse", "meshes/horse_statue_01/horse_statue_01_1k.gltf", ""),
+            (
+                "velvety horse",
+                "meshes/horse_statue_01/horse_statue_01_1k.gltf",
+                "--direction noise --color 0.8,0.75,0.7",
+            ),
             ("crushed velvet", "meshes/sofa_03/sofa_03_1k.gltf", velvet),
         ] {
             let folder = tempfile::tempdir().unwrap();

@@ -6,26 +6,26 @@ use kinran_bake::srgb_from_linear;
 use crate::picture::{Color, INK, PAPER, Picture};
 
 /// All colours and lengths are chosen by eye.
-const FAINT: Color = [150, 153, 162];
+const FAINT: Color = [170, 172, 180];
 const GRID: Color = [52, 54, 60];
 const CHANNELS: [Color; 3] = [[240, 96, 88], [112, 204, 112], [104, 148, 250]];
 
 /// Side of a panel, and pixels around and between them.
 const SIDE: u32 = 360;
-const MARGIN: u32 = 74;
+const MARGIN: u32 = 88;
 const TOP: u32 = 84;
 
 /// The punctual table as it looks, cuts through it at three curvatures, and the ambient factors.
 pub(crate) fn plot(title: &str, punctual: &Table, ambient: &Table, range: f32) -> Picture {
-    let mut picture = Picture::new(3 * (SIDE + MARGIN) + MARGIN / 2, TOP + SIDE + 64, PAPER);
-    picture.text((MARGIN, 32), 22.0, INK, title);
+    let mut picture = Picture::new(3 * (SIDE + MARGIN) + MARGIN / 2, TOP + SIDE + 74, PAPER);
+    picture.text((MARGIN, 32), 26.0, INK, title);
     let left = |panel: u32| MARGIN + panel * (SIDE + MARGIN);
     let curvatures = [0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (t, format!("{:.3}", t * range)));
     let cosines = [0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (t, format!("{:+.1}", 2.0 * t - 1.0)));
     let parts = [0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (t, format!("{t:.2}")));
 
     // The table, flat at the bottom, as plots have it.
-    picture.text((left(0), TOP - 14), 15.0, FAINT, "punctual light");
+    picture.text((left(0), TOP - 14), 18.0, FAINT, "punctual light");
     for y in 0..SIDE {
         for x in 0..SIDE {
             let (u, v) = ((x as f32 + 0.5) / SIDE as f32, 1.0 - (y as f32 + 0.5) / SIDE as f32);
@@ -39,7 +39,7 @@ pub(crate) fn plot(title: &str, punctual: &Table, ambient: &Table, range: f32) -
     // Cuts.
     let cuts = [0.1, 0.4, 1.0];
     let names = cuts.map(|v| format!("{:.3}", v * range)).join(", ");
-    picture.text((left(1), TOP - 14), 15.0, FAINT, &format!("at curvatures {names}"));
+    picture.text((left(1), TOP - 14), 18.0, FAINT, &format!("at curvatures {names}"));
     grid(&mut picture, left(1));
     axes(&mut picture, left(1), &cosines, &parts, ["n·u", "light that leaves"]);
     for v in cuts {
@@ -50,7 +50,7 @@ pub(crate) fn plot(title: &str, punctual: &Table, ambient: &Table, range: f32) -
     }
 
     // Ambient factors.
-    picture.text((left(2), TOP - 14), 15.0, FAINT, "ambient light: band 1, and band 2 darker");
+    picture.text((left(2), TOP - 14), 18.0, FAINT, "ambient: band 1, band 2 darker");
     grid(&mut picture, left(2));
     axes(&mut picture, left(2), &curvatures, &parts, ["mean curvature, 1/mm", "what remains"]);
     for (v, strength) in [(0.25, 1.0), (0.75, 0.6)] {
@@ -84,15 +84,15 @@ fn axes(
     [x_name, y_name]: [&str; 2],
 ) {
     for (t, label) in across {
-        let x = left as f32 + t * SIDE as f32 - 3.5 * label.chars().count() as f32;
-        picture.text((x.max(0.0) as u32, TOP + SIDE + 20), 13.0, FAINT, label);
+        let x = left as f32 + t * SIDE as f32 - 5.0 * label.chars().count() as f32;
+        picture.text((x.max(0.0) as u32, TOP + SIDE + 24), 17.0, FAINT, label);
     }
     for (t, label) in up {
         let y = TOP as f32 + (1.0 - t) * SIDE as f32 + 4.0;
-        let x = left - 8 - 8 * label.chars().count() as u32;
-        picture.text((x, y as u32), 13.0, FAINT, label);
+        let x = left - 8 - 11 * label.chars().count() as u32;
+        picture.text((x, y as u32), 17.0, FAINT, label);
     }
-    picture.text((left, TOP + SIDE + 44), 14.0, INK, &format!("across: {x_name}   up: {y_name}"));
+    picture.text((left, TOP + SIDE + 56), 19.0, INK, &format!("across: {x_name}   up: {y_name}"));
 }
 
 /// A curve of values from 0 to 1, two pixels wide, as coverage by vertical distance over the slope.
