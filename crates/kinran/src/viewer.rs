@@ -123,8 +123,13 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         Error::Usage(format!("no window can be opened: {e}; {fix}"))
     })?;
     let Some(path) = &args.screenshot else { return Ok(()) };
+    outcome.warnings.iter().for_each(|warning| console.warn(warning));
     let seconds = outcome.first_picture.unwrap_or_default().as_secs_f64();
-    let summary = Summary { screenshot: path.to_string_lossy().into_owned(), first_picture_seconds: seconds };
+    let summary = Summary {
+        screenshot: path.to_string_lossy().into_owned(),
+        first_picture_seconds: seconds,
+        warnings: outcome.warnings,
+    };
     console
         .result(&summary, &format!("{}: the first picture came {seconds:.2} s after reading", path.display()))
 }
@@ -134,4 +139,6 @@ struct Summary {
     screenshot: String,
     /// From the model's being read to its first picture.
     first_picture_seconds: f64,
+    /// What of the model is drawn otherwise than it says.
+    warnings: Vec<String>,
 }

@@ -31,6 +31,9 @@ const PROGRESS_INTERVAL: Duration = Duration::from_millis(200);
 /// Points; the longest label fits.
 const PANEL_WIDTH: f32 = 370.0;
 
+/// Points from the lower edge to a message: the progress of a bake fits under it.
+const MESSAGE_HEIGHT: f32 = 64.0;
+
 /// Radiance behind models; as pictures of `kinran render` have it.
 const BACKDROP: Vec3 = Vec3::new(0.085, 0.087, 0.092);
 
@@ -88,6 +91,8 @@ pub(super) struct App {
     title: String,
     help: bool,
     screenshot: Option<PathBuf>,
+    /// The window is open for a screenshot alone.
+    posing: bool,
     spp: u32,
     closing: Arc<Mutex<bool>>,
     outcome: Arc<Mutex<Outcome>>,
@@ -100,6 +105,8 @@ pub(super) struct Outcome {
     pub(super) failure: Option<Error>,
     /// Of the last model, from its being read to its first picture.
     pub(super) first_picture: Option<Duration>,
+    /// What the picture that the command line asks for does not show; nothing may lie over the model in it.
+    pub(super) warnings: Vec<String>,
 }
 
 impl App {
@@ -148,6 +155,7 @@ impl App {
             shader_check: Instant::now(),
             title: String::new(),
             help: false,
+            posing: start.screenshot.is_some(),
             screenshot: start.screenshot,
             spp: start.spp,
             closing: Arc::default(),
@@ -208,7 +216,11 @@ impl App {
         let mut messages = opened.warnings.clone();
         messages.extend(left_out(&opened.scene, &Settings { shadows: false, ..self.settings() }));
         messages.extend(strangers);
-        self.message = messages.join("\n");
+        if self.screenshot.is_some() {
+            self.outcome.lock().expect("no thread panics").warnings = messages;
+        } else {
+            self.message = messages.join("\n");
+        }
         self.model = Some(Model {
             first_picture: None,
             mapped: vec![false; authored.len()],
@@ -605,14 +617,16 @@ impl App {
             ctx.request_repaint_after(PROGRESS_INTERVAL);
         }
         let mut open = !self.message.is_empty();
+        // In the corner, since the model is in the middle, and above what is being done.
         egui::Window::new("Message")
             .open(&mut open)
             .collapsible(false)
+            .anchor(egui::Align2::LEFT_BOTTOM, vec2(12.0, -MESSAGE_HEIGHT))
             .show(ctx, |ui| ui.label(&self.message));
         if !open {
             self.message.clear();
         }
-        if !self.shader_error.is_empty() {
+        if !self.shader_error.is_empty() && !self.posing {
             egui::Window::new("Shader").anchor(egui::Align2::LEFT_TOP, vec2(12.0, 12.0)).show(ctx, |ui| {
                 ui.set_max_width(560.0);
                 ui.label("This does not compile; the last shaders that did are drawing.");
@@ -645,6 +659,10 @@ impl App {
             return;
         }
         let Some(path) = self.screenshot.take() else { return };
+        if !self.shader_error.is_empty() {
+            let what = format!("the last shaders that compiled are drawing; {}", self.shader_error);
+            self.outcome.lock().expect("no thread panics").warnings.push(what);
+        }
         let (closing, outcome, wake) = (self.closing.clone(), self.outcome.clone(), ctx.clone());
         ctx.request_screenshot(move |image| {
             let pixels = image.pixels.iter().map(|p| [p.r(), p.g(), p.b()]).collect();
