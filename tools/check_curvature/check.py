@@ -136,7 +136,7 @@ def main():
         pair = libigl(vertices, faces)
         mean = meshlab(vertices, faces)
         convex = pair[:, 1] > 0
-        # PyMeshLab's sign is the other one.
+        # Convex is positive here; versions of PyMeshLab that have it the other way round are turned.
         mean = mean if np.median(mean[convex]) > 0 else -mean
         truth = np.maximum(pair, 0)
         size = np.median(truth[:, 0])

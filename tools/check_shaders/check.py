@@ -2,9 +2,10 @@
 
 For every module a fragment shader is written that includes the module twice and calls each of its functions with
 values that are unknown before it runs; and one for the file of everything. glslang takes the GLSL and the HLSL, DXC the
-HLSL once more, spirv-val what came out, and the SPIR-V module is linked to a program that calls into it.
+HLSL once more, Slang makes WGSL and Metal of it, spirv-val takes what came out, and the SPIR-V module is linked to a
+program that calls into it.
 
-Usage: check.py LIBRARY_FOLDER WORK_FOLDER [DXC_COMMAND...]
+Usage: check.py LIBRARY_FOLDER WORK_FOLDER SLANGC [DXC_COMMAND...]; SLANGC may be empty.
 """
 
 import pathlib
@@ -12,7 +13,7 @@ import re
 import subprocess
 import sys
 
-library, work, dxc = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3:]
+library, work, slangc, dxc = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4:]
 failures = []
 
 
@@ -127,6 +128,9 @@ for folder, extension in [("glsl_450", "glsl"), ("glsl_es_300", "glsl"), ("hlsl"
             continue
         if run(f"glslang: {what}", "glslangValidator", "-D", "-V", "-S", "frag", "-e", "main", include, "-o", spirv, source):
             run(f"spirv-val: {what}", "spirv-val", "--target-env", "vulkan1.1", spirv)
+        for target in ["wgsl", "metal"] if slangc else []:
+            run(f"slang, {target}: {what}", slangc, source, f"-I{library / folder}", "-target", target, "-stage", "fragment",
+                "-entry", "main", "-o", source.with_suffix(f".{target}"))
         if dxc:
             folder_of_includes = library / folder
             for flags in (["-HV", "2018"], ["-HV", "2021"]):

@@ -91,6 +91,47 @@ fn estimated_normals_are_the_good_ones() {
     }
 }
 
+/// On irregular meshes curvature by normals from triangles has the same error however fine the mesh is.
+#[test]
+fn with_estimated_normals_the_error_does_not_fall() {
+    for method in [Method::Normals, Method::Fit] {
+        let rms_of = |columns: usize| {
+            let shape = ellipsoid((columns, columns / 2), dvec3(1.0, 0.7, 0.5), 0.3);
+            rms(&errors(&shape, &bake(&shape, false, &raw(method))))
+        };
+        let errors = [48, 96, 192].map(rms_of);
+        assert!(errors[0] < 0.1, "{method:?}: RMS {errors:?}");
+        for pair in errors.windows(2) {
+            assert!(2.0 * pair[1] < pair[0], "{method:?}: RMS for cells of half the size each: {errors:?}");
+        }
+    }
+}
+
+/// Of the larger principal curvature's ratio to the true one, the median less one: a parabola is narrower than the circle
+/// that touches it, and was taken for it.
+#[test]
+fn coarse_meshes_are_found_too_round() {
+    let cases = [
+        ("sphere of 642 points", sphere(8, 1.0, 0.0), 0.001),
+        ("irregular sphere", sphere(4, 1.0, 0.3), 0.001),
+        ("cylinder", cylinder((12, 6), 1.0, 4.0, 0.0), 0.001),
+        ("torus", torus((40, 16), 2.0, 0.8, 0.0), 0.02),
+        ("irregular torus", torus((40, 16), 2.0, 0.8, 0.3), 0.02),
+        ("coarse torus", torus((20, 8), 2.0, 0.8, 0.3), 0.04),
+        ("ellipsoid", ellipsoid((18, 9), dvec3(1.0, 0.7, 0.5), 0.3), 0.04),
+    ];
+    for (name, shape, allowed) in cases {
+        let baked = bake(&shape, false, &raw(Method::Fit));
+        let mut ratios: Vec<f64> = (0..shape.positions.len())
+            .filter(|&i| shape.inner[i])
+            .map(|i| f64::from(principal(baked.tensors[i]).0) / shape.curvatures[i].0)
+            .collect();
+        ratios.sort_by(f64::total_cmp);
+        let bias = quantile(&ratios, 0.5) - 1.0;
+        assert!(bias.abs() < allowed, "{name}: biased by {bias:+.4}, wanted within {allowed}");
+    }
+}
+
 #[test]
 fn a_fit_has_no_outlier_on_irregular_meshes() {
     // Median, 99 %, largest.

@@ -621,7 +621,7 @@ fn a_tilted_texel_s_matrix_is_read_in_the_shortest_arc_frame() {
         let lambda =
             |w: DVec3| 0.5 * ((1.0 + ((at * w.x).powi(2) + (ab * w.y).powi(2)) / (w.z * w.z)).sqrt() - 1.0);
         let wanted = d / ((1.0 + lambda(u) + lambda(v)) * 4.0 * v.z);
-        let compensation = multiscatter_compensation(Vec3::ONE, v.z as f32, alpha_t, alpha_b).x;
+        let compensation = multiscatter_compensation(Vec3::ONE, v.as_vec3(), alpha_t, alpha_b).x;
         assert_near(&format!("half vector {h}"), wanted * f64::from(compensation), got, 2e-3);
     }
 }

@@ -29,20 +29,25 @@ struct FuzzLight {
     float penetrated;
 };
 
-/// Share of light that passes the layer along a direction at cosine `n_w` to the normal without meeting a fibre:
+/// Cosines below this one, of light or view and normal, count as it: a layer of density 1e-4 lets nothing pass there, and
+/// quotients stay finite at the horizon.
+const float FUZZ_COSINE_MIN = 1e-6;
+
+/// Share of light that passes the layer along a direction at cosine `n_w` ≥ 0 to the normal without meeting a fibre:
 /// `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
 ///
 /// Cost on GCN: 4 instructions (2 at a quarter of the rate).
 float fuzz_passage(float density, float n_w) {
-    return exp2(((-1.442695 * density) / n_w));
+    return exp2(((-1.442695 * density) / max(n_w, FUZZ_COSINE_MIN)));
 }
 
 /// The layer's BRDF for a fibre albedo of one (slide: New Model): `p (1 - passed) / (n_u + n_v)`, where `passed` is
-/// `fuzz_passage` along the light times that along the view, and `phase` the phase function. Cosines must be positive.
+/// `fuzz_passage` along the light times that along the view, and `phase` the phase function; for cosines ≥ 0. Where both
+/// vanish the BRDF is infinite, and this is its value at FUZZ_COSINE_MIN.
 ///
 /// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 float fuzz_layer(float phase, float passed, float n_u, float n_v) {
-    return (phase * (1.0 - passed)) / (n_u + n_v);
+    return (phase * (1.0 - passed)) / max((n_u + n_v), FUZZ_COSINE_MIN);
 }
 
 /// BRDF of a layer of SGGX fibres for an albedo of one, per steradian, zero below the horizon; `u` light, `v` view and
@@ -87,18 +92,19 @@ float fuzz_reciprocal_brdf(vec3 u, vec3 v, vec3 t, float density, float alpha) {
     return (min(u.z, v.z) > 0.0) ? value : 0.0;
 }
 
-/// Prepares `fuzz_light` for a view at cosine `n_v` > 0 to the normal and `t_v` to the fibres.
+/// Prepares `fuzz_light` for a view at cosine `n_v` ≥ 0 to the normal and `t_v` to the fibres.
 ///
 /// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 FuzzView fuzz_view(float n_v, float t_v, float density, float alpha) {
-    float exponent = -1.442695 * density;
+    float exponent = -1.442695 * max(density, 1e-20);
+    float n = max(n_v, FUZZ_COSINE_MIN);
     float alpha_sqr = alpha * alpha;
     float k = 1.0 - alpha_sqr;
     float root = 157.91367 * alpha_sqr;
-    return FuzzView(n_v, t_v, exp2((exponent / n_v)), exponent, ((0.5 * k) / alpha_sqr), root, (root * k));
+    return FuzzView(n, t_v, exp2((exponent / n)), exponent, ((0.5 * k) / alpha_sqr), root, (root * k));
 }
 
-/// Lobe and penetration for a light at cosines `n_u` > 0 to the normal, `t_u` to the fibres and `u_v` to the view:
+/// Lobe and penetration for a light at cosines `n_u` ≥ 0 to the normal, `t_u` to the fibres and `u_v` to the view:
 /// `fuzz_brdf` with one exponential for both and all that is known of the view drawn together. The cosines are the same
 /// in every frame.
 ///
@@ -124,7 +130,7 @@ vec3 fuzz_attenuation(float penetrated, float escaped, float downward, vec3 fibr
 }
 
 /// The normal for the layer, between the normal-mapped `n` and the mesh's `vertex_normal` (slide: Deferred):
-/// `smoothness` 0 keeps `n`, 1 takes the mesh's.
+/// `smoothness` 0 keeps `n`, 1 takes the mesh's. They are less than 180° apart.
 ///
 /// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 vec3 fuzz_smooth_normal(vec3 n, vec3 vertex_normal, float smoothness) {

@@ -40,7 +40,7 @@ float fibre_p_s(float n_u, float t_u, float t_n, float alpha) {
     float _e27 = fibre_p_s_step(_e26, constant, linear, square);
     float slope = (((3.0 * _e27) + (2.0 * square)) * _e27) + linear;
     float area_sqr = 1.0 - ((k * t_u) * t_u);
-    float upward = (_e27 * sqrt(((_e27 + n_u) * (_e27 + ((alpha_sqr * n_u) / area_sqr))))) / max(slope, 1e-20);
+    float upward = (_e27 * sqrt(max(((_e27 + n_u) * (_e27 + ((alpha_sqr * n_u) / area_sqr))), 0.0))) / max(slope, 1e-20);
     return clamp((1.0 - upward), 0.0, 1.0);
 }
 

@@ -126,15 +126,15 @@ float sggx_overlap(float l, float moment, float moment_sqr) {
 vec3 sggx_principal_axis(mat3 s, vec3 start) {
     bool local_2 = false;
     bool local_3 = false;
-    mat3 identity = mat3(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0));
-    float _e17 = sym3_trace(s);
-    mat3 deviator = (s * (1.0 / _e17)) - (identity * 0.33333334);
-    float squares = (dot(deviator[0], deviator[0]) + dot(deviator[1], deviator[1])) + dot(deviator[2], deviator[2]);
+    float _e4 = sym3_trace(s);
+    mat3 _e7 = sym3_scale(s, (1.0 / _e4));
+    mat3 _e9 = sym3_add_diagonal(_e7, -0.33333334);
+    float squares = (dot(_e9[0], _e9[0]) + dot(_e9[1], _e9[1])) + dot(_e9[2], _e9[2]);
     float size = sqrt((squares * 0.16666667));
-    mat3 unit = deviator * (1.0 / size);
-    float _e41 = sym3_det(unit);
-    float r = 0.5 * _e41;
-    mat3 b = unit * ((r < 0.0) ? -1.0 : 1.0);
+    mat3 _e26 = sym3_scale(_e9, (1.0 / size));
+    float _e27 = sym3_det(_e26);
+    float r = 0.5 * _e27;
+    mat3 _e35 = sym3_scale(_e26, ((r < 0.0) ? -1.0 : 1.0));
     float t_sqr = max((0.5 - (0.5 * abs(r))), 0.0);
     float series = 1.0 + (t_sqr * (0.09259259 + (t_sqr * (0.039609052 + (t_sqr * 0.023157675)))));
     float sine = (sqrt(t_sqr) * 0.6666667) * series;
@@ -142,15 +142,15 @@ vec3 sggx_principal_axis(mat3 s, vec3 start) {
     float l_first = 2.0 * cosine;
     float l_second = (1.7320508 * sine) - cosine;
     float l_third = (-(1.7320508) * sine) - cosine;
-    vec3 bn = b * start;
+    vec3 bn = _e35 * start;
     float moment = dot(start, bn);
     float moment_sqr = dot(bn, bn);
-    float _e85 = sggx_overlap(l_first, moment, moment_sqr);
-    float w_first = clamp(_e85, 0.0, 1.0);
+    float _e71 = sggx_overlap(l_first, moment, moment_sqr);
+    float w_first = clamp(_e71, 0.0, 1.0);
     bool coincident = sine < 0.001;
     float rest = 1.0 - w_first;
-    float _e90 = sggx_overlap(l_second, moment, moment_sqr);
-    float w_second = coincident ? rest : min(max(_e90, 0.0), rest);
+    float _e76 = sggx_overlap(l_second, moment, moment_sqr);
+    float w_second = coincident ? rest : min(max(_e76, 0.0), rest);
     float w_third = (1.0 - w_first) - w_second;
     bool is_first = w_first >= max(w_second, w_third);
     vec3 p = bn - (start * (is_first ? l_second : l_first));
@@ -159,19 +159,20 @@ vec3 sggx_principal_axis(mat3 s, vec3 start) {
     } else {
         local_2 = true;
     }
-    bool _e108 = local_2;
-    float other = _e108 ? l_third : l_second;
-    vec3 q = (b * p) - (p * other);
+    bool _e94 = local_2;
+    float other = _e94 ? l_third : l_second;
+    vec3 q = (_e35 * p) - (p * other);
     if (coincident) {
         local_3 = !(is_first);
     } else {
         local_3 = false;
     }
-    bool _e117 = local_3;
-    vec3 projected = normalize((_e117 ? p : q));
-    float _e120 = sym3_quadratic(b, projected);
-    mat3 _e123 = sym3_adjugate((b - (identity * _e120)));
-    vec3 refined = _e123 * projected;
+    bool _e103 = local_3;
+    vec3 projected = normalize((_e103 ? p : q));
+    float _e106 = sym3_quadratic(_e35, projected);
+    mat3 _e108 = sym3_add_diagonal(_e35, -(_e106));
+    mat3 _e109 = sym3_adjugate(_e108);
+    vec3 refined = _e109 * projected;
     float refined_length = length(refined);
     bool far = refined_length > ((6.0 * 1.7320508) * 0.001);
     vec3 axis = far ? (refined * (1.0 / refined_length)) : projected;

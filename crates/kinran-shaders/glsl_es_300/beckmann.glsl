@@ -39,11 +39,11 @@ float beckmann_aniso_d(vec3 h, float sigma_t, float sigma_b) {
     return exp(((-0.5 * ((x * x) + (y * y))) / z_sqr)) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr);
 }
 
-/// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
+/// Slope towards which a unit normal with z ≥ 0 leans: `n.xy / n.z`, a million at most.
 ///
 /// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 vec2 slope_from_normal(vec3 n) {
-    return n.xy / vec2(n.z);
+    return n.xy / vec2(max(n.z, 1e-6));
 }
 
 /// Unit normal of a slope.

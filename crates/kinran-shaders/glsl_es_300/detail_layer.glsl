@@ -20,7 +20,7 @@ vec3 detail_from_texel(vec3 texel) {
 /// `KHR_texture_transform`'s, with columns `(cos sx, -sin sx)` and `(sin sy, cos sy)`.
 ///
 /// Cost on GCN: 4 instructions.
-vec2 detail_uv(vec2 uv, mat2x2 matrix, vec2 offset) {
+vec2 detail_uv(vec2 uv, mat2 matrix, vec2 offset) {
     return (matrix * uv) + offset;
 }
 

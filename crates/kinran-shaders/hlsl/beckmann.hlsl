@@ -42,12 +42,12 @@ float beckmann_aniso_d(float3 h, float sigma_t, float sigma_b)
     return exp(((-0.5 * ((x * x) + (y * y))) / z_sqr)) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr);
 }
 
-/// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
+/// Slope towards which a unit normal with z ≥ 0 leans: `n.xy / n.z`, a million at most.
 ///
 /// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 float2 slope_from_normal(float3 n)
 {
-    return n.xy / (n.z).xx;
+    return n.xy / (max(n.z, 1e-6)).xx;
 }
 
 /// Unit normal of a slope.

@@ -147,15 +147,15 @@ float3 sggx_principal_axis(float3x3 s, float3 start)
     bool local_2 = (bool)0;
     bool local_3 = (bool)0;
 
-    float3x3 identity = float3x3(float3(1.0, 0.0, 0.0), float3(0.0, 1.0, 0.0), float3(0.0, 0.0, 1.0));
-    const float _e17 = sym3_trace(s);
-    float3x3 deviator = mul((1.0 / _e17), s) - mul(0.33333334, identity);
-    float squares = (dot(deviator[0], deviator[0]) + dot(deviator[1], deviator[1])) + dot(deviator[2], deviator[2]);
+    const float _e4 = sym3_trace(s);
+    const float3x3 _e7 = sym3_scale(s, (1.0 / _e4));
+    const float3x3 _e9 = sym3_add_diagonal(_e7, -0.33333334);
+    float squares = (dot(_e9[0], _e9[0]) + dot(_e9[1], _e9[1])) + dot(_e9[2], _e9[2]);
     float size = sqrt((squares * 0.16666667));
-    float3x3 unit = mul((1.0 / size), deviator);
-    const float _e41 = sym3_det(unit);
-    float r = 0.5 * _e41;
-    float3x3 b = mul(((r < 0.0) ? -1.0 : 1.0), unit);
+    const float3x3 _e26 = sym3_scale(_e9, (1.0 / size));
+    const float _e27 = sym3_det(_e26);
+    float r = 0.5 * _e27;
+    const float3x3 _e35 = sym3_scale(_e26, ((r < 0.0) ? -1.0 : 1.0));
     float t_sqr = max((0.5 - (0.5 * abs(r))), 0.0);
     float series = 1.0 + (t_sqr * (0.09259259 + (t_sqr * (0.039609052 + (t_sqr * 0.023157675)))));
     float sine = (sqrt(t_sqr) * 0.6666667) * series;
@@ -163,15 +163,15 @@ float3 sggx_principal_axis(float3x3 s, float3 start)
     float l_first = 2.0 * cosine;
     float l_second = (1.7320508 * sine) - cosine;
     float l_third = (-(1.7320508) * sine) - cosine;
-    float3 bn = mul(start, b);
+    float3 bn = mul(start, _e35);
     float moment = dot(start, bn);
     float moment_sqr = dot(bn, bn);
-    const float _e85 = sggx_overlap(l_first, moment, moment_sqr);
-    float w_first = saturate(_e85);
+    const float _e71 = sggx_overlap(l_first, moment, moment_sqr);
+    float w_first = saturate(_e71);
     bool coincident = sine < 0.001;
     float rest = 1.0 - w_first;
-    const float _e90 = sggx_overlap(l_second, moment, moment_sqr);
-    float w_second = coincident ? rest : min(max(_e90, 0.0), rest);
+    const float _e76 = sggx_overlap(l_second, moment, moment_sqr);
+    float w_second = coincident ? rest : min(max(_e76, 0.0), rest);
     float w_third = (1.0 - w_first) - w_second;
     bool is_first = w_first >= max(w_second, w_third);
     float3 p = bn - (start * (is_first ? l_second : l_first));
@@ -180,19 +180,20 @@ float3 sggx_principal_axis(float3x3 s, float3 start)
     } else {
         local_2 = true;
     }
-    bool _e108 = local_2;
-    float other = _e108 ? l_third : l_second;
-    float3 q = mul(p, b) - (p * other);
+    bool _e94 = local_2;
+    float other = _e94 ? l_third : l_second;
+    float3 q = mul(p, _e35) - (p * other);
     if (coincident) {
         local_3 = !(is_first);
     } else {
         local_3 = false;
     }
-    bool _e117 = local_3;
-    float3 projected = normalize((_e117 ? p : q));
-    const float _e120 = sym3_quadratic(b, projected);
-    const float3x3 _e123 = sym3_adjugate((b - mul(_e120, identity)));
-    float3 refined = mul(projected, _e123);
+    bool _e103 = local_3;
+    float3 projected = normalize((_e103 ? p : q));
+    const float _e106 = sym3_quadratic(_e35, projected);
+    const float3x3 _e108 = sym3_add_diagonal(_e35, -(_e106));
+    const float3x3 _e109 = sym3_adjugate(_e108);
+    float3 refined = mul(projected, _e109);
     float refined_length = length(refined);
     bool far = refined_length > ((6.0 * 1.7320508) * 0.001);
     float3 axis = far ? (refined * (1.0 / refined_length)) : projected;

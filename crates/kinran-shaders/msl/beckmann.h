@@ -49,13 +49,13 @@ inline float beckmann_aniso_d(
     return metal::exp((-0.5 * ((x * x) + (y * y))) / z_sqr) / ((((6.2831855 * sigma_t) * sigma_b) * z_sqr) * z_sqr);
 }
 
-/// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
+/// Slope towards which a unit normal with z ≥ 0 leans: `n.xy / n.z`, a million at most.
 ///
 /// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 inline metal::float2 slope_from_normal(
     metal::float3 n
 ) {
-    return n.xy / metal::float2(n.z);
+    return n.xy / metal::float2(metal::max(n.z, 0.000001));
 }
 
 /// Unit normal of a slope.

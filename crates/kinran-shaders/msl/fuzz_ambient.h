@@ -54,20 +54,22 @@ constant float FUZZ_COMBED_ALPHA = 0.3;
 
 /// Mean over the hemisphere of the layer's BRDF times cosine over phase (slide: Ambient Lighting, `G~`), for a view at
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
-/// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002.
+/// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002; finite for all n_v in [0, 1].
 ///
 /// Cost on GCN: 15 instructions (4 at a quarter of the rate).
 inline float fuzz_g(
     float density,
     float n_v
 ) {
-    float dense = 1.0 - (n_v * metal::log(1.0 + (1.0 / n_v)));
-    float y = density / (n_v * dense);
+    float x = metal::max(n_v, FUZZ_COSINE_MIN);
+    float dense = 1.0 - (x * metal::log(1.0 + (1.0 / x)));
+    float y = density / (x * dense);
     float e = metal::exp2(-1.442695 * y);
     return (dense * (1.0 - e)) * (1.0 - ((0.1 * y) * e));
 }
 
-/// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients.
+/// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients; zero where there are
+/// no fibres.
 ///
 /// Cost on GCN: 8 instructions (1 at a quarter of the rate).
 inline float fuzz_g_talk(
@@ -76,7 +78,7 @@ inline float fuzz_g_talk(
     float n_v
 ) {
     float above = 1.0 + (n_v * (coefficients.inner[0] + (coefficients.inner[1] * n_v)));
-    return (density * above) / (density + (n_v * (coefficients.inner[2] + ((coefficients.inner[3] * n_v) * n_v))));
+    return (density * above) / metal::max(density + (n_v * (coefficients.inner[2] + ((coefficients.inner[3] * n_v) * n_v))), 0.00000000000000000001);
 }
 
 /// Share of uniform irradiance that reaches the base unscattered, `2 E_3(d)` (slide: Ambient Shadowing, `Q~`); within
@@ -138,7 +140,7 @@ inline float fuzz_ambient_tabulated(
     float density,
     float n_v
 ) {
-    return texel.x + ((texel.y * density) / (density + n_v));
+    return texel.x + ((texel.y * density) / metal::max(density + n_v, 0.00000000000000000001));
 }
 
 /// Mean direction of the light that the lobe gathers, shorter than one, by four coefficients of the same fit:

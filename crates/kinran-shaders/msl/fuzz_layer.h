@@ -31,7 +31,11 @@ struct FuzzLight {
     float penetrated;
 };
 
-/// Share of light that passes the layer along a direction at cosine `n_w` to the normal without meeting a fibre:
+/// Cosines below this one, of light or view and normal, count as it: a layer of density 1e-4 lets nothing pass there, and
+/// quotients stay finite at the horizon.
+constant float FUZZ_COSINE_MIN = 0.000001;
+
+/// Share of light that passes the layer along a direction at cosine `n_w` ≥ 0 to the normal without meeting a fibre:
 /// `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
 ///
 /// Cost on GCN: 4 instructions (2 at a quarter of the rate).
@@ -39,11 +43,12 @@ inline float fuzz_passage(
     float density,
     float n_w
 ) {
-    return metal::exp2((-1.442695 * density) / n_w);
+    return metal::exp2((-1.442695 * density) / metal::max(n_w, FUZZ_COSINE_MIN));
 }
 
 /// The layer's BRDF for a fibre albedo of one (slide: New Model): `p (1 - passed) / (n_u + n_v)`, where `passed` is
-/// `fuzz_passage` along the light times that along the view, and `phase` the phase function. Cosines must be positive.
+/// `fuzz_passage` along the light times that along the view, and `phase` the phase function; for cosines ≥ 0. Where both
+/// vanish the BRDF is infinite, and this is its value at FUZZ_COSINE_MIN.
 ///
 /// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 inline float fuzz_layer(
@@ -52,7 +57,7 @@ inline float fuzz_layer(
     float n_u,
     float n_v
 ) {
-    return (phase * (1.0 - passed)) / (n_u + n_v);
+    return (phase * (1.0 - passed)) / metal::max(n_u + n_v, FUZZ_COSINE_MIN);
 }
 
 /// BRDF of a layer of SGGX fibres for an albedo of one, per steradian, zero below the horizon; `u` light, `v` view and
@@ -115,7 +120,7 @@ inline float fuzz_reciprocal_brdf(
     return (metal::min(u.z, v.z) > 0.0) ? value : 0.0;
 }
 
-/// Prepares `fuzz_light` for a view at cosine `n_v` > 0 to the normal and `t_v` to the fibres.
+/// Prepares `fuzz_light` for a view at cosine `n_v` ≥ 0 to the normal and `t_v` to the fibres.
 ///
 /// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 inline FuzzView fuzz_view(
@@ -124,14 +129,15 @@ inline FuzzView fuzz_view(
     float density,
     float alpha
 ) {
-    float exponent = -1.442695 * density;
+    float exponent = -1.442695 * metal::max(density, 0.00000000000000000001);
+    float n = metal::max(n_v, FUZZ_COSINE_MIN);
     float alpha_sqr = alpha * alpha;
     float k = 1.0 - alpha_sqr;
     float root = 157.91367 * alpha_sqr;
-    return FuzzView {n_v, t_v, metal::exp2(exponent / n_v), exponent, (0.5 * k) / alpha_sqr, root, root * k};
+    return FuzzView {n, t_v, metal::exp2(exponent / n), exponent, (0.5 * k) / alpha_sqr, root, root * k};
 }
 
-/// Lobe and penetration for a light at cosines `n_u` > 0 to the normal, `t_u` to the fibres and `u_v` to the view:
+/// Lobe and penetration for a light at cosines `n_u` ≥ 0 to the normal, `t_u` to the fibres and `u_v` to the view:
 /// `fuzz_brdf` with one exponential for both and all that is known of the view drawn together. The cosines are the same
 /// in every frame.
 ///
@@ -167,7 +173,7 @@ inline metal::float3 fuzz_attenuation(
 }
 
 /// The normal for the layer, between the normal-mapped `n` and the mesh's `vertex_normal` (slide: Deferred):
-/// `smoothness` 0 keeps `n`, 1 takes the mesh's.
+/// `smoothness` 0 keeps `n`, 1 takes the mesh's. They are less than 180° apart.
 ///
 /// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 inline metal::float3 fuzz_smooth_normal(

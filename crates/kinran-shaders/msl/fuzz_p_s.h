@@ -59,7 +59,7 @@ inline float fibre_p_s(
     float _e27 = fibre_p_s_step(_e26, constant_1, linear, square);
     float slope = (((3.0 * _e27) + (2.0 * square)) * _e27) + linear;
     float area_sqr = 1.0 - ((k * t_u) * t_u);
-    float upward = (_e27 * metal::sqrt((_e27 + n_u) * (_e27 + ((alpha_sqr * n_u) / area_sqr)))) / metal::max(slope, 0.00000000000000000001);
+    float upward = (_e27 * metal::sqrt(metal::max((_e27 + n_u) * (_e27 + ((alpha_sqr * n_u) / area_sqr)), 0.0))) / metal::max(slope, 0.00000000000000000001);
     return metal::saturate(1.0 - upward);
 }
 

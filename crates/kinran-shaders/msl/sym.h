@@ -133,6 +133,22 @@ inline metal::float3 sym2_sqrt(
     return (a + metal::float3(root_det, 0.0, root_det)) * (1.0 / scale);
 }
 
+/// `k A`. Column by column: a matrix times a number, which HLSL writes `mul(k, A)`, is refused by Slang for WGSL.
+inline metal::float3x3 sym3_scale(
+    metal::float3x3 a,
+    float k
+) {
+    return metal::float3x3(a[0] * k, a[1] * k, a[2] * k);
+}
+
+/// `A + d I`.
+inline metal::float3x3 sym3_add_diagonal(
+    metal::float3x3 a,
+    float d
+) {
+    return metal::float3x3(a[0] + metal::float3(d, 0.0, 0.0), a[1] + metal::float3(0.0, d, 0.0), a[2] + metal::float3(0.0, 0.0, d));
+}
+
 /// `v^T A v`.
 ///
 /// Cost on GCN: 12 instructions.

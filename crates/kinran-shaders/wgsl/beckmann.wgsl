@@ -37,11 +37,11 @@ fn beckmann_aniso_d(h: vec3f, sigma_t: f32, sigma_b: f32) -> f32 {
     return exp(-0.5 * (x * x + y * y) / z_sqr) / (6.2831853 * sigma_t * sigma_b * z_sqr * z_sqr);
 }
 
-/// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
+/// Slope towards which a unit normal with z ≥ 0 leans: `n.xy / n.z`, a million at most.
 ///
 /// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 fn slope_from_normal(n: vec3f) -> vec2f {
-    return n.xy / n.z;
+    return n.xy / max(n.z, 1e-6);
 }
 
 /// Unit normal of a slope.

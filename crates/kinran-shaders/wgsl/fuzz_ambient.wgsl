@@ -12,22 +12,24 @@
 
 /// Mean over the hemisphere of the layer's BRDF times cosine over phase (slide: Ambient Lighting, `G~`), for a view at
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
-/// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002.
+/// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002; finite for all n_v in [0, 1].
 ///
 /// Cost on GCN: 15 instructions (4 at a quarter of the rate).
 fn fuzz_g(density: f32, n_v: f32) -> f32 {
-    let dense = 1.0 - n_v * log(1.0 + 1.0 / n_v);
-    let y = density / (n_v * dense);
+    let x = max(n_v, FUZZ_COSINE_MIN);
+    let dense = 1.0 - x * log(1.0 + 1.0 / x);
+    let y = density / (x * dense);
     let e = exp2(-1.44269504 * y);
     return dense * (1.0 - e) * (1.0 - 0.1 * y * e);
 }
 
-/// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients.
+/// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients; zero where there are
+/// no fibres.
 ///
 /// Cost on GCN: 8 instructions (1 at a quarter of the rate).
 fn fuzz_g_talk(coefficients: array<f32, 4>, density: f32, n_v: f32) -> f32 {
     let above = 1.0 + n_v * (coefficients[0] + coefficients[1] * n_v);
-    return density * above / (density + n_v * (coefficients[2] + coefficients[3] * n_v * n_v));
+    return density * above / max(density + n_v * (coefficients[2] + coefficients[3] * n_v * n_v), 1e-20);
 }
 
 /// Share of uniform irradiance that reaches the base unscattered, `2 E_3(d)` (slide: Ambient Shadowing, `Q~`); within
@@ -79,7 +81,7 @@ fn fuzz_ambient_place(n_v: f32, t_v: f32, t_n: f32) -> vec2f {
 ///
 /// Cost on GCN: 4 instructions (1 at a quarter of the rate).
 fn fuzz_ambient_tabulated(texel: vec2f, density: f32, n_v: f32) -> f32 {
-    return texel.x + texel.y * density / (density + n_v);
+    return texel.x + texel.y * density / max(density + n_v, 1e-20);
 }
 
 /// Mean direction of the light that the lobe gathers, shorter than one, by four coefficients of the same fit:

@@ -7,20 +7,25 @@
 // Koenderink, Pont. The Secret of Velvety Skin. Machine Vision and Applications 2003.
 // Patry. Samurai Shading in Ghost of Tsushima. SIGGRAPH 2020.
 
-/// Share of light that passes the layer along a direction at cosine `n_w` to the normal without meeting a fibre:
+/// Cosines below this one, of light or view and normal, count as it: a layer of density 1e-4 lets nothing pass there, and
+/// quotients stay finite at the horizon.
+const FUZZ_COSINE_MIN: f32 = 1e-6;
+
+/// Share of light that passes the layer along a direction at cosine `n_w` ≥ 0 to the normal without meeting a fibre:
 /// `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
 ///
 /// Cost on GCN: 4 instructions (2 at a quarter of the rate).
 fn fuzz_passage(density: f32, n_w: f32) -> f32 {
-    return exp2(-1.44269504 * density / n_w);
+    return exp2(-1.44269504 * density / max(n_w, FUZZ_COSINE_MIN));
 }
 
 /// The layer's BRDF for a fibre albedo of one (slide: New Model): `p (1 - passed) / (n_u + n_v)`, where `passed` is
-/// `fuzz_passage` along the light times that along the view, and `phase` the phase function. Cosines must be positive.
+/// `fuzz_passage` along the light times that along the view, and `phase` the phase function; for cosines ≥ 0. Where both
+/// vanish the BRDF is infinite, and this is its value at FUZZ_COSINE_MIN.
 ///
 /// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 fn fuzz_layer(phase: f32, passed: f32, n_u: f32, n_v: f32) -> f32 {
-    return phase * (1.0 - passed) / (n_u + n_v);
+    return phase * (1.0 - passed) / max(n_u + n_v, FUZZ_COSINE_MIN);
 }
 
 /// BRDF of a layer of SGGX fibres for an albedo of one, per steradian, zero below the horizon; `u` light, `v` view and
@@ -58,13 +63,13 @@ fn fuzz_reciprocal_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, alpha: f32) 
 
 /// What the layer's lobe needs of a view, once a pixel.
 struct FuzzView {
-    /// Cosine of view and normal.
+    /// Cosine of view and normal, at least FUZZ_COSINE_MIN.
     n_v: f32,
     /// Cosine of view and fibre.
     t_v: f32,
     /// `P_e`: the share of the base's light that reaches the viewer.
     escaped: f32,
-    /// `-d log2(e)`.
+    /// `-d log2(e)`, below zero also for a density of zero.
     exponent: f32,
     /// `(1-α²) / 2α²`.
     squeeze: f32,
@@ -82,18 +87,20 @@ struct FuzzLight {
     penetrated: f32,
 }
 
-/// Prepares `fuzz_light` for a view at cosine `n_v` > 0 to the normal and `t_v` to the fibres.
+/// Prepares `fuzz_light` for a view at cosine `n_v` ≥ 0 to the normal and `t_v` to the fibres.
 ///
 /// Cost on GCN: 11 instructions (3 at a quarter of the rate).
 fn fuzz_view(n_v: f32, t_v: f32, density: f32, alpha: f32) -> FuzzView {
-    let exponent = -1.44269504 * density;
+    // Over a light's cosine of zero it is infinite and the power zero; a zero would be none over it.
+    let exponent = -1.44269504 * max(density, 1e-20);
+    let n = max(n_v, FUZZ_COSINE_MIN);
     let alpha_sqr = alpha * alpha;
     let k = 1.0 - alpha_sqr;
     let root = 157.91367 * alpha_sqr;
-    return FuzzView(n_v, t_v, exp2(exponent / n_v), exponent, 0.5 * k / alpha_sqr, root, root * k);
+    return FuzzView(n, t_v, exp2(exponent / n), exponent, 0.5 * k / alpha_sqr, root, root * k);
 }
 
-/// Lobe and penetration for a light at cosines `n_u` > 0 to the normal, `t_u` to the fibres and `u_v` to the view:
+/// Lobe and penetration for a light at cosines `n_u` ≥ 0 to the normal, `t_u` to the fibres and `u_v` to the view:
 /// `fuzz_brdf` with one exponential for both and all that is known of the view drawn together. The cosines are the same
 /// in every frame.
 ///
@@ -121,7 +128,7 @@ fn fuzz_attenuation(penetrated: f32, escaped: f32, downward: f32, fibre_color: v
 }
 
 /// The normal for the layer, between the normal-mapped `n` and the mesh's `vertex_normal` (slide: Deferred):
-/// `smoothness` 0 keeps `n`, 1 takes the mesh's.
+/// `smoothness` 0 keeps `n`, 1 takes the mesh's. They are less than 180° apart.
 ///
 /// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 fn fuzz_smooth_normal(n: vec3f, vertex_normal: vec3f, smoothness: f32) -> vec3f {

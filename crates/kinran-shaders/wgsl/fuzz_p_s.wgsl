@@ -39,7 +39,7 @@ fn fibre_p_s(n_u: f32, t_u: f32, t_n: f32, alpha: f32) -> f32 {
     let l = fibre_p_s_step(third, constant, linear, square);
     let slope = (3.0 * l + 2.0 * square) * l + linear;
     let area_sqr = 1.0 - k * t_u * t_u;
-    let upward = l * sqrt((l + n_u) * (l + alpha_sqr * n_u / area_sqr)) / max(slope, 1e-20);
+    let upward = l * sqrt(max((l + n_u) * (l + alpha_sqr * n_u / area_sqr), 0.0)) / max(slope, 1e-20);
     return saturate(1.0 - upward);
 }
 

@@ -11,9 +11,6 @@
 // A lobe of a light is D V F n·u times the light's irradiance. What depends on the view alone (the stretched v of the
 // visibility, products of alphas) is the same for every light, and compilers keep it out of an unrolled loop.
 
-/// The smallest positive normal number: keeps divisions finite.
-const MIN_POSITIVE: f32 = 1.1754944e-38;
-
 /// 1 / π.
 const FRAC_1_PI: f32 = 0.31830988618379067;
 
@@ -50,11 +47,12 @@ fn ggx_matrix_d(h: vec3f, a: vec3f) -> f32 {
 }
 
 /// Visibility from the two terms of `2 n·u n·v (1 + Λ(u) + Λ(v))`: `n·v |u'|` and `n·u |v'|`, where the prime
-/// stretches a direction by the roughness. Finite, and meaningless, where both directions graze.
+/// stretches a direction by the roughness. Finite, and meaningless, where both directions graze: their sum is 8e-9 where
+/// both cosines are 1e-6 and alpha is ALPHA_MIN. The bound keeps the product with the sharpest peak finite too.
 ///
 /// Cost on GCN: 3 instructions (1 at a quarter of the rate).
 fn smith_v_of_terms(u: f32, v: f32) -> f32 {
-    return 0.5 / max(u + v, MIN_POSITIVE);
+    return 0.5 / max(u + v, 1e-12);
 }
 
 /// Height-correlated Smith visibility `G2 / (4 n·u n·v)`, isotropic (Heitz 2014, eq. 99).

@@ -111,13 +111,12 @@ fn sggx_principal_axis(s: mat3x3f, start: vec3f) -> vec3f {
 
     // The deviator B of unit size and det B >= 0: its eigenvalues are 2 cos(φ), 2 cos(φ ± 2π/3) with 3φ = acos(r),
     // the first at least sqrt(3) away from the others.
-    let identity = mat3x3f(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), vec3f(0.0, 0.0, 1.0));
-    let deviator = s * (1.0 / sym3_trace(s)) - identity * (1.0 / 3.0);
+    let deviator = sym3_add_diagonal(sym3_scale(s, 1.0 / sym3_trace(s)), -1.0 / 3.0);
     let squares = dot(deviator[0], deviator[0]) + dot(deviator[1], deviator[1]) + dot(deviator[2], deviator[2]);
     let size = sqrt(squares * (1.0 / 6.0));
-    let unit = deviator * (1.0 / size);
+    let unit = sym3_scale(deviator, 1.0 / size);
     let r = 0.5 * sym3_det(unit);
-    let b = unit * select(1.0, -1.0, r < 0.0);
+    let b = sym3_scale(unit, select(1.0, -1.0, r < 0.0));
 
     // sin(2/3 asin(t)) with t = sin(3φ/2) <= sqrt(1/2) by four terms of its series, within 0.1 %: the refinement
     // below cubes the error.
@@ -147,7 +146,7 @@ fn sggx_principal_axis(s: mat3x3f, start: vec3f) -> vec3f {
     let projected = normalize(select(q, p, coincident && !is_first));
 
     // One step of Rayleigh quotient iteration, adj(B - (n^T B n) I) n.
-    let refined = sym3_adjugate(b - identity * sym3_quadratic(b, projected)) * projected;
+    let refined = sym3_adjugate(sym3_add_diagonal(b, -sym3_quadratic(b, projected))) * projected;
     let refined_length = length(refined);
     // The length is the product of the distances to both other eigenvalues, 6 sqrt(3) sine for a close one.
     let far = refined_length > 6.0 * sqrt_three * coincidence;

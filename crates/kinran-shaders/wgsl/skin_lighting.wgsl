@@ -47,7 +47,7 @@ fn skin_specular(n_h: f32, n_u: f32, n_v: f32, alpha_one: f32, alpha_two: f32, s
 }
 
 /// The normal of one channel: from the normal map's `n` towards the mesh's `n_mesh` by `blur`, 0 to 1
-/// (SKIN_NORMAL_BLUR). Gloss keeps `n`.
+/// (SKIN_NORMAL_BLUR). Gloss keeps `n`. They are less than 180° apart.
 ///
 /// Cost on GCN: 13 instructions (1 at a quarter of the rate).
 fn skin_normal(n: vec3f, n_mesh: vec3f, blur: f32) -> vec3f {

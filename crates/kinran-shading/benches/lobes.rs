@@ -122,7 +122,7 @@ fn vndf_pdf(bencher: Bencher<'_, '_>) {
 
 #[divan::bench]
 fn multiscatter(bencher: Bencher<'_, '_>) {
-    run(bencher, |i| multiscatter_compensation(F0, i.v.z, i.alpha_t, i.alpha_b));
+    run(bencher, |i| multiscatter_compensation(F0, i.v, i.alpha_t, i.alpha_b));
 }
 
 #[divan::bench]

@@ -52,9 +52,9 @@ impl LeanMoments {
     }
 }
 
-/// Slope towards which a unit normal leans: `n.xy / n.z`. `n.z` must be positive.
+/// Slope towards which a unit normal with z ≥ 0 leans: `n.xy / n.z`, a million at most.
 pub fn slope_from_normal(n: Vec3) -> Vec2 {
-    vec2(n.x, n.y) / n.z
+    vec2(n.x, n.y) / n.z.max(1e-6)
 }
 
 /// Unit normal of a slope.

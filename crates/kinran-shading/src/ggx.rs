@@ -63,10 +63,12 @@ pub fn smith_matrix_v(u: Vec3, v: Vec3, a: Sym2) -> f32 {
 }
 
 /// Visibility from the two terms of `2 n·u n·v (1 + Λ(u) + Λ(v))`: `n·v |u'|` and `n·u |v'|`, where the prime
-/// stretches a direction by the roughness. Finite, and meaningless, where both directions graze.
+/// stretches a direction by the roughness. Finite, and meaningless, where both directions graze: their sum is 8e-9 where
+/// both cosines are 1e-6 and alpha is [`ALPHA_MIN`](crate::ALPHA_MIN). The bound keeps the product with the sharpest peak
+/// finite too.
 #[inline(always)]
 fn smith_v_of_terms(u: f32, v: f32) -> f32 {
-    0.5 / (u + v).max(f32::MIN_POSITIVE)
+    0.5 / (u + v).max(1e-12)
 }
 
 /// Smith masking of `v` alone, 0 to 1 (Heitz 2014, eq. 43).

@@ -34,7 +34,7 @@ pub use ggx::{
     ggx_aniso_d, ggx_d, ggx_matrix_d, ggx_vndf_pdf, ggx_vndf_sample, schlick_f, smith_aniso_g1,
     smith_aniso_v, smith_matrix_v, smith_v,
 };
-pub use multiscatter::{ggx_directional_albedo, multiscatter_compensation};
+pub use multiscatter::{ggx_albedo_alpha, ggx_directional_albedo, multiscatter_compensation};
 pub use sggx::{
     UNIT_SLOPES, ggx_from_sggx, ggx_from_sggx_unclamped, microfacet_basis, sggx_d, sggx_from_ggx,
     sggx_from_slopes, sggx_power_iteration, sggx_principal_axis, sggx_projected_area, slopes_from_sggx,

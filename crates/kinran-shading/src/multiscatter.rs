@@ -2,6 +2,7 @@
 //!
 //! - Turquin. Practical multiple scattering compensation for microfacet models. 2019.
 
+use crate::sqrt::sqrt;
 use glam::Vec3;
 
 /// Directional albedo of the single-scattering GGX lobe with height-correlated Smith masking and F = 1, for
@@ -22,15 +23,24 @@ pub fn ggx_directional_albedo(n_v: f32, alpha: f32) -> f32 {
     (1.0 - a * p / q).clamp(0.3, 1.0)
 }
 
-/// Factor on the single-scattering lobe that restores the energy of all further bounces, `1 + f0 (1/E - 1)`
-/// (Turquin 2019, eq. 16). White isotropic facets then pass the furnace within 3.5 %; the factor depends on
-/// the view alone, so the compensated lobe is not reciprocal.
+/// Roughness of the isotropic lobe whose albedo stands for that of an anisotropic one, for the unit view `v` in the frame
+/// of the alphas: squared, the mean of `alpha_t²` and `alpha_b²` from above; the flatter the view, the more that across it
+/// counts, towards which facets send most light: `(alpha_t² + alpha_b² + 0.8 (alpha_t² - alpha_b²) (v.y⁴ - v.x⁴)) / 2`.
 ///
-/// An anisotropic lobe uses the isotropic albedo at `alpha = sqrt((alpha_t² + alpha_b²)/2)`, the best of
-/// six means tried: RMS error of E 0.027 over random pairs in [0.05, 1] and all views, worst 0.24 (a flat
-/// view along the smaller roughness of an extreme pair).
-pub fn multiscatter_compensation(f0: Vec3, n_v: f32, alpha_t: f32, alpha_b: f32) -> Vec3 {
-    let alpha = crate::sqrt::sqrt(0.5 * (alpha_t * alpha_t + alpha_b * alpha_b));
-    let e = ggx_directional_albedo(n_v.clamp(0.0, 1.0), alpha);
+/// The squared roughness along the view has the weight `(1 - 0.8 sin⁴θ) / 2`. RMS error of E 0.019 over random pairs in
+/// [0.05, 1] and all views, where the mean alone has 0.030; the factor is that of the least. The worst is 0.32, at a flat
+/// view across the pair (1, 0.05).
+pub fn ggx_albedo_alpha(v: Vec3, alpha_t: f32, alpha_b: f32) -> f32 {
+    let (t, b) = (alpha_t * alpha_t, alpha_b * alpha_b);
+    let (x, y) = (v.x * v.x, v.y * v.y);
+    sqrt(0.5 * (t + b) + 0.4 * (t - b) * (y * y - x * x))
+}
+
+/// Factor on the single-scattering lobe that restores the energy of all further bounces, `1 + f0 (1/E - 1)`
+/// (Turquin 2019, eq. 16), for the unit view `v` in the frame of the alphas, z along the normal. White isotropic facets
+/// then pass the furnace within 3.5 %; the factor depends on the view alone, so the compensated lobe is not reciprocal.
+/// An anisotropic lobe uses the isotropic albedo at [`ggx_albedo_alpha`].
+pub fn multiscatter_compensation(f0: Vec3, v: Vec3, alpha_t: f32, alpha_b: f32) -> Vec3 {
+    let e = ggx_directional_albedo(v.z.clamp(0.0, 1.0), ggx_albedo_alpha(v, alpha_t, alpha_b));
     Vec3::ONE + f0 * (e.recip() - 1.0)
 }

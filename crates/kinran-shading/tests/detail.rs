@@ -228,6 +228,21 @@ proptest! {
         }
     }
 
+    /// Beside all bases of a fine grid on the horizon, through the rotation itself.
+    #[test]
+    fn another_base_on_the_horizon_is_nearer(target in hemisphere(), detail in hemisphere()) {
+        prop_assume!((target - detail).truncate().length() > target.z + detail.z);
+        let angle = |base: Vec3| {
+            let got = (m_n(base) * detail).as_dvec3();
+            got.cross(target.as_dvec3()).length().atan2(got.dot(target.as_dvec3())).to_degrees()
+        };
+        let s = rnm_inverse(target, detail);
+        let grid = (0..3600).map(|i| Vec2::from_angle((0.1 * i as f32).to_radians()).extend(0.0));
+        let best = grid.min_by(|a, b| angle(*a).total_cmp(&angle(*b))).unwrap();
+        let (want, got) = (angle(best), angle(s));
+        prop_assert!(got <= want + 1e-3, "{target} from {detail}: {s} is {got}° off, {best} {want}°");
+    }
+
     #[test]
     fn over_finds_what_lies_in_reach(
         s in prop::array::uniform3(0.0..=1.0_f32),

@@ -71,7 +71,7 @@ proptest! {
         prop_assert!((0.0..=1.000_001).contains(&g1), "G1: {g1}");
         let f = schlick_f(Vec3::new(0.0, 0.04, 1.0), v.dot(h));
         prop_assert!(f.cmpge(Vec3::ZERO).all() && f.cmple(Vec3::ONE).all(), "F: {f}");
-        let factor = multiscatter_compensation(Vec3::ONE, v.z, t, b).x;
+        let factor = multiscatter_compensation(Vec3::ONE, v, t, b).x;
         prop_assert!((1.0..=1.0 / 0.3 + 1e-6).contains(&factor), "compensation: {factor}");
         let e = ggx_directional_albedo(v.z, t);
         prop_assert!((0.3..=1.0).contains(&e), "E: {e}");

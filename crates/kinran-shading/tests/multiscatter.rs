@@ -64,7 +64,7 @@ fn white_isotropic_facets_pass_the_furnace() {
                     f64::from(f * u.z) * 4.0 * v.dot(h) * solid_angle
                 })
                 .sum::<f64>();
-            let factor = multiscatter_compensation(Vec3::ONE, n_v as f32, alpha, alpha).x;
+            let factor = multiscatter_compensation(Vec3::ONE, v.as_vec3(), alpha, alpha).x;
             let got = single * f64::from(factor);
             // 0.011 of E, over the smallest E there is.
             assert!(
@@ -83,9 +83,10 @@ fn anisotropic_compensation_keeps_its_stated_error() {
     for mut rng in cases(1, count) {
         let ggx = Ggx { alpha_t: rng.range(0.05, 1.0), alpha_b: rng.range(0.05, 1.0) };
         let (n_v, phi) = (rng.range(0.005, 1.0), rng.range(0.0, TAU));
-        let wanted = ggx.albedo(view(n_v, phi), 64);
+        let v = view(n_v, phi);
+        let wanted = ggx.albedo(v, 64);
         let factor =
-            multiscatter_compensation(Vec3::ONE, n_v as f32, ggx.alpha_t as f32, ggx.alpha_b as f32).x;
+            multiscatter_compensation(Vec3::ONE, v.as_vec3(), ggx.alpha_t as f32, ggx.alpha_b as f32).x;
         let error = f64::from(factor.recip()) - wanted;
         sum += error * error;
         if error.abs() > worst.0 {
@@ -93,15 +94,31 @@ fn anisotropic_compensation_keeps_its_stated_error() {
         }
     }
     let rms = (sum / count as f64).sqrt();
-    assert!(rms < 0.029, "RMS error of E: wanted below 0.029, got {rms}");
-    assert!(worst.0 < 0.25, "worst error of E: {}", worst.1);
+    assert!(rms < 0.020, "RMS error of E: wanted below 0.020, got {rms}");
+    assert!(worst.0 < 0.33, "worst error of E: {}", worst.1);
+}
+
+/// The pair and view with the largest error there is, which random ones may miss; the mean of both squares has 0.352.
+#[test]
+fn the_worst_error_of_anisotropic_compensation_is_not_the_stated_one() {
+    let ggx = Ggx { alpha_t: 1.0, alpha_b: 0.05 };
+    let mut worst = 0.0_f64;
+    for n_v in [0.02, 0.05, 0.1, 0.2] {
+        for step in 0..=8 {
+            let v = view(n_v, f64::from(step) / 32.0 * TAU);
+            let factor = multiscatter_compensation(Vec3::ONE, v.as_vec3(), 1.0, 0.05).x;
+            worst = worst.max((f64::from(factor.recip()) - ggx.albedo(v, 96)).abs());
+        }
+    }
+    assert!((0.31..0.33).contains(&worst), "wanted 0.32, got {worst}");
 }
 
 #[test]
 fn compensation_leaves_black_facets_black_and_never_darkens() {
     for n_v in [0.0, 0.01, 0.5, 1.0] {
         for alphas in [(0.004, 0.004), (1.0, 0.004), (1.0, 1.0)] {
-            let factor = multiscatter_compensation(Vec3::new(0.0, 0.5, 1.0), n_v, alphas.0, alphas.1);
+            let v = view(n_v.into(), 1.0).as_vec3();
+            let factor = multiscatter_compensation(Vec3::new(0.0, 0.5, 1.0), v, alphas.0, alphas.1);
             assert_eq!(factor.x, 1.0, "f0 = 0 at n·v {n_v}, alphas {alphas:?}");
             assert!(
                 1.0 <= factor.y && factor.y <= factor.z && factor.z <= 1.0 / 0.3,

@@ -44,6 +44,30 @@ fn fits_are_printed_as_a_table_as_json_and_as_constants() {
     }
 }
 
+/// The talk's six coefficients overshoot P_s of combed fibres.
+#[test]
+fn coefficients_that_make_energy_are_handed_out_in_silence() {
+    let said = |spread: &str, more: &[&str]| {
+        let (ok, out, error) = kinran(&[more, &["fit", "fuzz", "--tilt", "60", "--spread", spread]].concat());
+        assert!(ok, "{error}");
+        out
+    };
+    for (spread, makes_energy) in [("0.01", true), ("0.2", false)] {
+        let json: serde_json::Value = serde_json::from_str(&said(spread, &["--json"])).unwrap();
+        let returned = json["returned"].as_f64().unwrap();
+        assert_eq!(returned > 1.0, makes_energy, "spread {spread}: {returned}");
+        assert_eq!(json["warning"].is_string(), makes_energy, "{json}");
+        assert_eq!(said(spread, &[]).contains("warning: the coefficients of p_s make energy"), makes_energy);
+        let (_, constants, _) =
+            kinran(&["fit", "fuzz", "--tilt", "60", "--spread", spread, "--lang", "wgsl"]);
+        assert_eq!(
+            constants.contains("// Warning: the coefficients of p_s make energy"),
+            makes_energy,
+            "{constants}"
+        );
+    }
+}
+
 #[test]
 fn tables_and_plots_are_written_and_bad_angles_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -86,8 +86,11 @@ fn to_glsl(wgsl: &str, version: glsl::Version) -> Result<String, Error> {
         .write()?;
     let stub = text.find("\nvoid main() {").ok_or("naga wrote no stub")?;
     text.truncate(stub);
-    // The same type under the name that Godot's dialect knows too.
-    Ok(text.replace("mat3x3", "mat3"))
+    // The same types under the names that Godot's dialect knows too.
+    for n in 2..=4 {
+        text = text.replace(&format!("mat{n}x{n}"), &format!("mat{n}"));
+    }
+    Ok(text)
 }
 
 fn to_hlsl(wgsl: &str) -> Result<String, Error> {

@@ -53,7 +53,7 @@ pub(crate) fn rows() -> Vec<Row> {
     let local_v = "
     let local_v = vec3f(dot(t, v), dot(b, v), max(dot(n, v), 1e-4));";
     let compensation = "
-    let compensation = multiscatter_compensation(pixel.f0, local_v.z, alpha_t, alpha_b);";
+    let compensation = multiscatter_compensation(pixel.f0, local_v, alpha_t, alpha_b);";
     let anisotropic = "
         let local_u = vec3f(dot(t, u), dot(b, u), n_u);
         let h = normalize(local_u + local_v);

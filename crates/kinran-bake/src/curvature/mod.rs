@@ -58,7 +58,7 @@ impl Default for Options {
 pub struct Mesh<'a> {
     /// Rest pose.
     pub positions: &'a [Vec3],
-    /// The artist's, unit length; `None` has them estimated (Max 1999).
+    /// The artist's, unit length; `None` has them estimated, as [`estimated_normals`] does.
     pub normals: Option<&'a [Vec3]>,
     /// Unit xyz and the sign of the bitangent, `b = w cross(n, t)`; `None` takes an arbitrary frame about the normal.
     pub tangents: Option<&'a [Vec4]>,
@@ -174,9 +174,10 @@ pub struct Curvature {
 pub fn bake_curvature(mesh: &Mesh<'_>, options: &Options) -> Result<Curvature, CurvatureError> {
     check(mesh, options)?;
     let surface = weld(mesh.positions, mesh.normals, mesh.triangles);
+    let fans = Fans::new(surface.positions.len(), &surface.triangles);
     let (normals, hard_points) = match mesh.normals {
         Some(authored) => normals::authored_normals(&surface, authored),
-        None => (normals::max_normals(&surface), 0),
+        None => (normals::estimated_normals(&surface, &fans), 0),
     };
     let from_faces = faces::face_tensors(&surface, &normals);
     let mut tensors = from_faces.tensors;
@@ -189,7 +190,6 @@ pub fn bake_curvature(mesh: &Mesh<'_>, options: &Options) -> Result<Curvature, C
         ..Report::default()
     };
     if options.method == Method::Fit || !options.blur.is_empty() {
-        let fans = Fans::new(surface.positions.len(), &surface.triangles);
         if options.method == Method::Fit {
             report.unfitted_points = quadric::quadric_tensors(&surface, &fans, &normals, &mut tensors);
         }
@@ -401,11 +401,13 @@ pub fn principal(tensor: Sym2) -> (f32, f32, [f32; 2]) {
     (mean + radius, mean - radius, axis.to_array())
 }
 
-/// Unit normals of a mesh that has none, from its triangles (Max 1999), as [`bake_curvature`] takes them. Zero at vertices
-/// of no triangle.
+/// Unit normals of a mesh that has none, as [`bake_curvature`] takes them: of the surfaces fitted to the points around each
+/// point, over normals from triangles (Max 1999), which creases keep. On a smooth surface the error falls with the square
+/// of the distance between points or faster. Zero at vertices of no triangle.
 pub fn estimated_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
     let surface = weld(positions, None, triangles);
-    let normals = normals::max_normals(&surface);
+    let fans = Fans::new(surface.positions.len(), &surface.triangles);
+    let normals = normals::estimated_normals(&surface, &fans);
     surface.point_of.iter().map(|&point| normals[point as usize]).collect()
 }
 

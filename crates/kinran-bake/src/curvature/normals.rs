@@ -1,13 +1,21 @@
 //! Normals of points.
 
-use super::surface::Welded;
+use super::quadric::quadric_normals;
+use super::surface::{Fans, Welded};
 use glam::Vec3;
+
+/// Normals of a mesh that has none: of the surfaces that [`quadric_normals`] fits over [`max_normals`]. Zero where no
+/// triangle says anything.
+pub(crate) fn estimated_normals(surface: &Welded, fans: &Fans) -> Vec<Vec3> {
+    quadric_normals(surface, fans, &max_normals(surface))
+}
 
 /// Normals from the triangles around each point (Max. Weights for Computing Vertex Normals from Facet Normals. Journal of
 /// Graphics Tools 4(2), 1999): cross products of the edges at a corner over both squared lengths. Exact where the
-/// points lie on a sphere, and several times better than area or angle weights on irregular meshes. Zero where
-/// no triangle says anything.
-pub(crate) fn max_normals(surface: &Welded) -> Vec<Vec3> {
+/// points lie on a sphere, and several times better than area or angle weights on irregular meshes, but on these their
+/// error only halves with the distance between points, and curvature's then stays the same. Zero where no triangle says
+/// anything.
+fn max_normals(surface: &Welded) -> Vec<Vec3> {
     let p = &surface.positions;
     let mut normals = vec![Vec3::ZERO; p.len()];
     for &[a, b, c] in &surface.triangles {

@@ -3,14 +3,19 @@
 //! - Cazals, Pouget. Estimating Differential Quantities Using Polynomial Fitting of Osculating Jets. SGP 2003.
 //! - Panozzo, Puppo, Rocca. Efficient Multi-scale Curvature and Crease Estimation. 2010.
 //!
-//! Over the tangent plane, `z = d x + e y - (a x² + 2 b x y + c y²) / 2 + cubic terms`, by least squares over two rings of
-//! neighbours. The normals serve as directions of projection only, so their errors, which on irregular meshes are
-//! most of the error of [`faces`](super::faces), hardly matter; cubic terms take up what an uneven ring would leave
+//! Over the tangent plane, `z = d x + e y + (a x² + 2 b x y + c y² + g z²) / 2 + cubic terms`, by least squares over two
+//! rings of neighbours. The normals serve as directions of projection only, so their errors, which on irregular meshes
+//! are most of the error of [`faces`](super::faces), hardly matter; cubic terms take up what an uneven ring would leave
 //! in the quadratic ones. With too few neighbours for them the fit is quadratic.
+//!
+//! Two things keep coarse meshes from being found too round. A graph that bends like a circle rises faster than its
+//! parabola, by `k³ x⁴ / 8`: the term `g z²` knows that, with the g of a sphere or cylinder that bends as the fit does;
+//! these are fitted exactly. And a neighbour counts by the curvature that its height says, `2 z / r²`, so that the far
+//! ones, of which there are more, do not say it all.
 
 use super::faces::frame;
 use super::surface::{Fans, Welded, others};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use kinran_shading::Sym2;
 use rayon::prelude::*;
 
@@ -26,6 +31,14 @@ const RINGS_MAX: usize = 4;
 
 /// Neighbours that are looked at.
 const NEIGHBOURS_MAX: usize = 64;
+
+/// Squared distance, over the farthest one's, below which nearer neighbours count no more: a double point would say all.
+/// Chosen by eye.
+const NEAREST: f64 = 0.01;
+
+/// Cosine to the normal from triangles, below which a fitted normal is that of no surface but of a crease: 18°, several
+/// times what they differ by on the coarsest of smooth meshes. Chosen by eye.
+const SAME_NORMAL: f32 = 0.95;
 
 /// Points of one piece of work.
 const BAND: usize = 4096;
@@ -45,26 +58,50 @@ pub(crate) fn quadric_tensors(
     normals: &[Vec3],
     tensors: &mut [Sym2],
 ) -> usize {
+    fit(surface, fans, normals, tensors, |graph, _| graph.shape_operator())
+}
+
+/// Normals of the fitted surfaces, whose error falls with the square of the distance between points or faster. Points that
+/// cannot be fitted, and those on creases, keep the given ones.
+pub(crate) fn quadric_normals(surface: &Welded, fans: &Fans, given: &[Vec3]) -> Vec<Vec3> {
+    let mut normals = given.to_vec();
+    fit(surface, fans, given, &mut normals, |graph, point| {
+        let normal = graph.normal(given[point]);
+        if normal.dot(given[point]) > SAME_NORMAL { normal } else { given[point] }
+    });
+    normals
+}
+
+/// Puts what `of` makes of the surface fitted at each point into `results`, and leaves them as they are where there is
+/// none; how many these are.
+fn fit<T: Send>(
+    surface: &Welded,
+    fans: &Fans,
+    normals: &[Vec3],
+    results: &mut [T],
+    of: impl Fn(Graph, usize) -> T + Sync,
+) -> usize {
     let points = surface.positions.len();
     let rings = || Rings { seen: vec![u32::MAX; points], points: Vec::with_capacity(NEIGHBOURS_MAX) };
-    let bands = tensors.par_chunks_mut(BAND).enumerate();
-    let unfitted = bands.map_init(rings, |rings, (band, tensors)| {
+    let bands = results.par_chunks_mut(BAND).enumerate();
+    let unfitted = bands.map_init(rings, |rings, (band, results)| {
         let first = band * BAND;
-        pulp::Arch::new().dispatch(FitBand { surface, fans, normals, rings, first, tensors })
+        pulp::Arch::new().dispatch(FitBand { surface, fans, normals, rings, first, results, of: &of })
     });
     unfitted.sum()
 }
 
-struct FitBand<'a> {
+struct FitBand<'a, T, F> {
     surface: &'a Welded,
     fans: &'a Fans,
     normals: &'a [Vec3],
     rings: &'a mut Rings,
     first: usize,
-    tensors: &'a mut [Sym2],
+    results: &'a mut [T],
+    of: &'a F,
 }
 
-impl pulp::WithSimd for FitBand<'_> {
+impl<T, F: Fn(Graph, usize) -> T> pulp::WithSimd for FitBand<'_, T, F> {
     type Output = usize;
 
     #[inline(always)]
@@ -72,10 +109,11 @@ impl pulp::WithSimd for FitBand<'_> {
         let mut unfitted = 0;
         let mut group =
             Group { local: [[[0.0; LANES]; 3]; NEIGHBOURS_MAX], counts: [0; LANES], inverse: [0.0; LANES] };
-        for (i, tensors) in self.tensors.chunks_mut(LANES).enumerate() {
+        for (i, results) in self.results.chunks_mut(LANES).enumerate() {
+            let first = self.first + i * LANES;
             group.counts = [0; LANES];
-            for l in 0..tensors.len() {
-                let point = self.first + i * LANES + l;
+            for l in 0..results.len() {
+                let point = first + l;
                 if self.normals[point] != Vec3::ZERO {
                     self.rings.collect(self.surface, self.fans, point);
                     group.place(l, self.surface, self.normals, &self.rings.points);
@@ -84,17 +122,17 @@ impl pulp::WithSimd for FitBand<'_> {
             let neighbours = group.pad();
             let (cubic, solved) = solve::<CUBIC>(&group.local[..neighbours]);
             let mut missed = [false; LANES];
-            for (l, tensor) in tensors.iter_mut().enumerate() {
+            for (l, result) in results.iter_mut().enumerate() {
                 missed[l] = !solved[l] || group.counts[l] < ENOUGH;
                 if !missed[l] {
-                    *tensor = weingarten(&cubic, l, group.inverse[l]);
+                    *result = (self.of)(Graph::new(&cubic, l, group.inverse[l]), first + l);
                 }
             }
             if missed.contains(&true) {
                 let (quadratic, solved) = solve::<QUADRATIC>(&group.local[..neighbours]);
-                for (l, tensor) in tensors.iter_mut().enumerate().filter(|(l, _)| missed[*l]) {
+                for (l, result) in results.iter_mut().enumerate().filter(|(l, _)| missed[*l]) {
                     if solved[l] && group.counts[l] >= QUADRATIC {
-                        *tensor = weingarten(&quadratic, l, group.inverse[l]);
+                        *result = (self.of)(Graph::new(&quadratic, l, group.inverse[l]), first + l);
                     } else {
                         unfitted += 1;
                     }
@@ -192,26 +230,58 @@ impl Group {
     }
 }
 
-/// The shape operator of the graph at the origin, in the frame of the given normal: the one of the fitted tangent plane,
-/// turned back by the shortest arc.
-fn weingarten(coefficients: &[Lanes], l: usize, inverse: f64) -> Sym2 {
-    let [d, e, xx, xy, yy] = [0, 1, 2, 3, 4].map(|i| coefficients[i][l]);
-    // Second form over the length of the normal, convex positive.
-    let squared = 1.0 + d * d + e * e;
-    let scale = -inverse / squared.sqrt();
-    let second = [scale * xx, scale * xy, scale * yy];
+/// A fitted surface at its point: a graph over the plane of a given normal.
+struct Graph {
+    /// Slopes along the frame's tangent and bitangent.
+    slopes: [f64; 2],
+    /// Second derivatives (xx, xy, yy), 1 over the mesh's unit; convex is negative.
+    second: [f64; 3],
+}
 
-    // Tangent vectors u whose pictures under the arc are x and y: with n = (-d, -e, 1) / |n| the arc from z to n takes x
-    // to a vector whose plane coordinates are these.
-    let length = squared.sqrt();
-    let (nx, ny, nz) = (-d / length, -e / length, 1.0 / length);
-    let k = 1.0 / (1.0 + nz);
-    let u = [1.0 - nx * nx * k, -nx * ny * k];
-    let v = [-nx * ny * k, 1.0 - ny * ny * k];
-    let form = |p: [f64; 2], q: [f64; 2]| {
-        second[0] * p[0] * q[0] + second[1] * (p[0] * q[1] + p[1] * q[0]) + second[2] * p[1] * q[1]
-    };
-    Sym2 { xx: form(u, u) as f32, xy: form(u, v) as f32, yy: form(v, v) as f32 }
+impl Graph {
+    /// From what [`solve`] gives for a lane whose neighbours were scaled by `inverse`.
+    fn new<const N: usize>([height, square]: &[[Lanes; N]; 2], l: usize, inverse: f64) -> Self {
+        // The coefficients are linear in g, and g follows from them: k where the surface bends to one side only, as a
+        // sphere (both curvatures k) or a cylinder (k and 0), and less the more it is a saddle, whose height knows no z².
+        let mut c = [0, 1, 2, 3, 4].map(|i| height[i][l]);
+        for _ in 0..4 {
+            let (mean, half) = (0.5 * (c[2] + c[4]), 0.5 * (c[2] - c[4]));
+            let apart = (half * half + c[3] * c[3]).sqrt();
+            let length = (mean * mean + apart * apart).sqrt().max(f64::MIN_POSITIVE);
+            let share = (std::f64::consts::SQRT_2 * mean / length).clamp(-1.0, 1.0);
+            let g = mean + share * apart;
+            c = [0, 1, 2, 3, 4].map(|i| height[i][l] - g * square[i][l]);
+        }
+        Graph { slopes: [c[0], c[1]], second: [c[2], c[3], c[4]].map(|c| c * inverse) }
+    }
+
+    /// The unit normal, where the graph stands over the plane of the unit normal `n`.
+    fn normal(&self, n: Vec3) -> Vec3 {
+        let (t, b) = frame(n);
+        let [d, e] = self.slopes;
+        let normal: DVec3 = n.as_dvec3() - d * t.as_dvec3() - e * b.as_dvec3();
+        normal.normalize().as_vec3()
+    }
+
+    /// The shape operator, convex positive, in the frame of the given normal: the one of the fitted tangent plane, turned
+    /// back by the shortest arc.
+    fn shape_operator(&self) -> Sym2 {
+        let [d, e] = self.slopes;
+        // Second form over the length of the normal, convex positive.
+        let length = (1.0 + d * d + e * e).sqrt();
+        let second = self.second.map(|c| -c / length);
+
+        // Tangent vectors u whose pictures under the arc are x and y: with n = (-d, -e, 1) / |n| the arc from z to n takes x
+        // to a vector whose plane coordinates are these.
+        let (nx, ny, nz) = (-d / length, -e / length, 1.0 / length);
+        let k = 1.0 / (1.0 + nz);
+        let u = [1.0 - nx * nx * k, -nx * ny * k];
+        let v = [-nx * ny * k, 1.0 - ny * ny * k];
+        let form = |p: [f64; 2], q: [f64; 2]| {
+            second[0] * p[0] * q[0] + second[1] * (p[0] * q[1] + p[1] * q[0]) + second[2] * p[1] * q[1]
+        };
+        Sym2 { xx: form(u, u) as f32, xy: form(u, v) as f32, yy: form(v, v) as f32 }
+    }
 }
 
 /// `to += a b` in every lane.
@@ -238,24 +308,30 @@ fn multiply(to: &mut Lanes, a: Lanes) {
     }
 }
 
-/// Least squares of `z` on `x, y, x²/2, xy, y²/2` and, with nine coefficients, the cubic monomials: normal equations by
-/// Cholesky, in every lane. Also whether the neighbours determine them.
+/// Least squares of `z` and of `z²/2` on `x, y, x²/2, xy, y²/2` and, with nine coefficients, the cubic monomials, each
+/// neighbour over its squared distance: normal equations by Cholesky, in every lane. Also whether the neighbours
+/// determine them.
 #[inline(always)]
-fn solve<const N: usize>(neighbours: &[[Lanes; 3]]) -> ([Lanes; N], [bool; LANES]) {
+fn solve<const N: usize>(neighbours: &[[Lanes; 3]]) -> ([[Lanes; N]; 2], [bool; LANES]) {
     let mut matrix = [[[0.0f64; LANES]; N]; N];
-    let mut right = [[0.0f64; LANES]; N];
+    let mut rights = [[[0.0f64; LANES]; N]; 2];
     for [x, y, z] in neighbours {
         let mut all = [[0.0f64; LANES]; CUBIC];
+        let mut goals = [[0.0f64; LANES]; 2];
         for l in 0..LANES {
-            let (x, y) = (x[l], y[l]);
+            let (x, y, z) = (x[l], y[l], z[l]);
             let (x2, xy, y2) = (x * x, x * y, y * y);
+            let w = 1.0 / (x2 + y2 + z * z + NEAREST);
             let monomials = [x, y, 0.5 * x2, xy, 0.5 * y2, x2 * x, x2 * y, x * y2, y2 * y];
             for (all, monomial) in all.iter_mut().zip(monomials) {
-                all[l] = monomial;
+                all[l] = w * monomial;
             }
+            (goals[0][l], goals[1][l]) = (w * z, 0.5 * w * z * z);
         }
         for i in 0..N {
-            add_product(&mut right[i], all[i], *z);
+            for (right, goal) in rights.iter_mut().zip(goals) {
+                add_product(&mut right[i], all[i], goal);
+            }
             // Row i from the diagonal on.
             for j in i..N {
                 add_product(&mut matrix[i][j], all[i], all[j]);
@@ -283,19 +359,21 @@ fn solve<const N: usize>(neighbours: &[[Lanes; 3]]) -> ([Lanes; N], [bool; LANES
             multiply(&mut matrix[i][j], pivot);
         }
     }
-    for i in 0..N {
-        for k in 0..i {
-            let known = right[k];
-            subtract_product(&mut right[i], matrix[k][i], known);
+    for right in &mut rights {
+        for i in 0..N {
+            for k in 0..i {
+                let known = right[k];
+                subtract_product(&mut right[i], matrix[k][i], known);
+            }
+            multiply(&mut right[i], matrix[i][i]);
         }
-        multiply(&mut right[i], matrix[i][i]);
-    }
-    for i in (0..N).rev() {
-        for k in i + 1..N {
-            let known = right[k];
-            subtract_product(&mut right[i], matrix[i][k], known);
+        for i in (0..N).rev() {
+            for k in i + 1..N {
+                let known = right[k];
+                subtract_product(&mut right[i], matrix[i][k], known);
+            }
+            multiply(&mut right[i], matrix[i][i]);
         }
-        multiply(&mut right[i], matrix[i][i]);
     }
-    (right, solved)
+    (rights, solved)
 }

@@ -183,7 +183,7 @@ pub fn fibre_p_s_exact(n_u: f64, t_u: f64, t_n: f64, alpha: f64) -> f64 {
         l -= 3.0 * value / (slope(l) + root).max(1e-40);
     }
     let area_sqr = 1.0 - k * t_u * t_u;
-    let upward = l * ((l + n_u) * (l + a2 * n_u / area_sqr)).sqrt() / slope(l).max(1e-40);
+    let upward = l * ((l + n_u) * (l + a2 * n_u / area_sqr)).max(0.0).sqrt() / slope(l).max(1e-40);
     (1.0 - upward).clamp(0.0, 1.0)
 }
 
@@ -207,6 +207,28 @@ pub fn p_s_exact(phase: Phase, u: DVec3, t: DVec3, alpha: f64) -> f64 {
         }
     }
     sum * phase.scale(alpha) * 2.0 * PI / ring.len() as f64
+}
+
+/// The share of a light from the unit vector `u` above the horizon that the layer itself sends up, for fibres of albedo one:
+/// `∫ f(u, v) (v·n) dv`, for each density, by the quadrature of [`Fibres::gathered`].
+pub fn sent_up(phase: Phase, u: DVec3, t: DVec3, alpha: f64, densities: &[f64]) -> Vec<f64> {
+    let Lights { rows, ring } = &*LIGHTS;
+    let t_u = t.dot(u);
+    let scale = phase.of_light(t_u, alpha) * phase.scale(alpha) * 2.0 * PI / ring.len() as f64;
+    let mut sums = vec![0.0; densities.len()];
+    for &(z, weight) in rows {
+        let r = (1.0 - z * z).sqrt();
+        let scattered = |&(cos, sin): &(f64, f64)| {
+            let v = DVec3::new(r * cos, r * sin, z);
+            let s = t_u + t.dot(v);
+            phase.of_half(s * s, (2.0 + 2.0 * u.dot(v)).max(1e-12), alpha)
+        };
+        let total = scale * weight * ring.iter().map(scattered).sum::<f64>();
+        for (sum, density) in sums.iter_mut().zip(densities) {
+            *sum += total * -libm::expm1(-density * (1.0 / z + 1.0 / u.z)) * z / (z + u.z);
+        }
+    }
+    sums
 }
 
 /// The exponential integral E1 for x > 0 (Abramowitz and Stegun 5.1.11, 5.1.22).

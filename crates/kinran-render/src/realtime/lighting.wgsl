@@ -50,15 +50,15 @@ fn grazing_albedo(n_v: f32, alpha: f32) -> f32 {
 
 fn lobe_of(surface: Surface, view: vec3f) -> Lobe {
     let v = vec3f(dot(surface.tangent, view), dot(surface.bitangent, view), max(dot(surface.normal, view), N_V_MIN));
-    let alpha = sqrt(0.5 * (surface.alpha_t * surface.alpha_t + surface.alpha_b * surface.alpha_b));
+    let alpha = ggx_albedo_alpha(v, surface.alpha_t, surface.alpha_b);
     let white = ggx_directional_albedo(v.z, alpha);
     let grazing = grazing_albedo(v.z, alpha);
     let base_reflectance = mix(vec3f(DIELECTRIC), surface.base_color, surface.metallic);
-    let compensation = multiscatter_compensation(base_reflectance, v.z, surface.alpha_t, surface.alpha_b);
+    let compensation = multiscatter_compensation(base_reflectance, v, surface.alpha_t, surface.alpha_b);
     let single = base_reflectance * (white - grazing) + grazing;
 
     let dielectric = (DIELECTRIC * (white - grazing) + grazing)
-        * multiscatter_compensation(vec3f(DIELECTRIC), v.z, surface.alpha_t, surface.alpha_b).x;
+        * multiscatter_compensation(vec3f(DIELECTRIC), v, surface.alpha_t, surface.alpha_b).x;
     let inside = (1.0 - surface.metallic) * (1.0 - min(dielectric, 1.0));
     let scattered = inside * (1.0 - surface.transmissive);
     return Lobe(

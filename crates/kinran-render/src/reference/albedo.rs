@@ -3,8 +3,8 @@
 use super::sampler::sample_2d;
 use glam::{Vec2, Vec3, vec2, vec3};
 use kinran_shading::{
-    ALPHA_MIN, ggx_directional_albedo, ggx_vndf_sample, multiscatter_compensation, smith_aniso_g1,
-    smith_aniso_v,
+    ALPHA_MIN, ggx_albedo_alpha, ggx_directional_albedo, ggx_vndf_sample, multiscatter_compensation,
+    smith_aniso_g1, smith_aniso_v,
 };
 use std::sync::LazyLock;
 
@@ -21,11 +21,11 @@ pub(crate) static GRAZING: LazyLock<Vec<f32>> = LazyLock::new(|| {
 });
 
 /// Directional albedo of the specular lobe of a surface with reflectance `f0` at normal incidence, Schlick's
-/// Fresnel and multiscatter compensation, for a view at cosine `n_v`. What it leaves, 1 minus it, is what the
-/// diffuse part may have: together they pass the white furnace. Anisotropic lobes use the isotropic albedo at
-/// `sqrt((alpha_t² + alpha_b²)/2)`, as [`multiscatter_compensation`] does.
-pub(crate) fn specular_albedo(f0: f32, n_v: f32, alpha_t: f32, alpha_b: f32) -> f32 {
-    let alpha = (0.5 * (alpha_t * alpha_t + alpha_b * alpha_b)).sqrt();
+/// Fresnel and multiscatter compensation, for the view `v` in the frame of the alphas. What it leaves, 1 minus it, is what
+/// the diffuse part may have: together they pass the white furnace. Anisotropic lobes use the isotropic albedo at
+/// [`ggx_albedo_alpha`], as [`multiscatter_compensation`] does.
+pub(crate) fn specular_albedo(f0: f32, v: Vec3, alpha_t: f32, alpha_b: f32) -> f32 {
+    let (n_v, alpha) = (v.z, ggx_albedo_alpha(v, alpha_t, alpha_b));
     let white = ggx_directional_albedo(n_v, alpha);
 
     // Bilinear between the nodes.
@@ -38,7 +38,7 @@ pub(crate) fn specular_albedo(f0: f32, n_v: f32, alpha_t: f32, alpha_b: f32) -> 
     let grazing = row(i) + (row(i + SIZE) - row(i)) * f.y;
 
     let single = f0 * (white - grazing) + grazing;
-    let compensation = multiscatter_compensation(Vec3::splat(f0), n_v, alpha_t, alpha_b).x;
+    let compensation = multiscatter_compensation(Vec3::splat(f0), v, alpha_t, alpha_b).x;
     (single * compensation).min(1.0)
 }
 
@@ -64,6 +64,10 @@ fn grazing_albedo(n_v: f32, alpha: f32, samples: u32) -> f32 {
 mod tests {
     use super::*;
 
+    fn view(n_v: f32) -> Vec3 {
+        vec3((1.0 - n_v * n_v).sqrt(), 0.0, n_v)
+    }
+
     #[test]
     fn the_table_agrees_with_many_samples_between_its_nodes() {
         for alpha in [0.004, 0.013, 0.09, 0.31, 0.77, 1.0] {
@@ -71,7 +75,7 @@ mod tests {
                 let wanted = grazing_albedo(n_v, alpha, 1 << 14);
                 let white = ggx_directional_albedo(n_v, alpha);
                 // At f0 = 0 the compensation is one and the albedo is the tabulated part alone.
-                let got = specular_albedo(0.0, n_v, alpha, alpha);
+                let got = specular_albedo(0.0, view(n_v), alpha, alpha);
                 // (1 - x²)^5 of the square root x is interpolated over cells of 1/31: 10 / (8 · 31²). The rest is
                 // the corner where n·v and alpha are both near 0.01 and masking sets in within one cell.
                 assert!((wanted - got).abs() < 1e-2, "n_v {n_v} alpha {alpha}: wanted {wanted}, got {got}");
@@ -82,9 +86,9 @@ mod tests {
 
     #[test]
     fn a_white_mirror_leaves_nothing_and_a_smooth_dielectric_follows_fresnel() {
-        assert!((specular_albedo(1.0, 0.7, 0.5, 0.5) - 1.0).abs() < 2e-3);
+        assert!((specular_albedo(1.0, view(0.7), 0.5, 0.5) - 1.0).abs() < 2e-3);
         let fresnel = 0.04 + 0.96 * 0.3f32.powi(5);
-        let got = specular_albedo(0.04, 0.7, ALPHA_MIN, ALPHA_MIN);
+        let got = specular_albedo(0.04, view(0.7), ALPHA_MIN, ALPHA_MIN);
         assert!((got - fresnel).abs() < 3e-3, "wanted {fresnel}, got {got}");
     }
 }

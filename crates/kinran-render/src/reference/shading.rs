@@ -171,7 +171,7 @@ impl Shading {
         let v = frame.transpose() * view;
 
         let f0 = Vec3::splat(DIELECTRIC_F0).lerp(base.xyz(), metallic);
-        let inside = 1.0 - specular_albedo(DIELECTRIC_F0, v.z, alpha_t, alpha_b);
+        let inside = 1.0 - specular_albedo(DIELECTRIC_F0, v, alpha_t, alpha_b);
         let passed = base.xyz() * (1.0 - metallic) * inside;
         let (scattered, translucent) = match &material.translucency {
             Some(t) => {
@@ -191,7 +191,7 @@ impl Shading {
             alpha_t,
             alpha_b,
             f0,
-            compensation: multiscatter_compensation(f0, v.z, alpha_t, alpha_b),
+            compensation: multiscatter_compensation(f0, v, alpha_t, alpha_b),
             diffuse,
             translucent: translucent * opaque,
             transmitted: passed * (1.0 - opaque),
@@ -251,7 +251,7 @@ impl Shading {
 
     /// How bright the specular and the diffuse lobe of the base are, roughly, for sampling.
     pub(crate) fn brightness(&self) -> (f32, f32) {
-        let specular = specular_albedo(self.f0.max_element(), self.v.z, self.alpha_t, self.alpha_b);
+        let specular = specular_albedo(self.f0.max_element(), self.v, self.alpha_t, self.alpha_b);
         (specular, self.diffuse.max_element())
     }
 }

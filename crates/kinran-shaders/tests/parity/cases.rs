@@ -29,11 +29,23 @@ pub(crate) struct Case {
 /// Values of one argument.
 #[derive(Clone)]
 pub(crate) struct Argument {
+    /// Both ends of the closed range that the functions' docs state, and values of interest.
     edges: Vec<Vec<f32>>,
     random: fn(&mut Rng) -> Vec<f32>,
 }
 
 impl Case {
+    /// All combinations of edges.
+    pub(crate) fn corners(&self) -> Vec<Vec<f32>> {
+        let mut corners = vec![Vec::new()];
+        for argument in &self.arguments {
+            corners = (corners.iter())
+                .flat_map(|before| argument.edges.iter().map(|edge| [&before[..], edge].concat()))
+                .collect();
+        }
+        corners
+    }
+
     /// `count` inputs: all combinations of edges (as many as fit into half of them), then random ones. The same for
     /// every run.
     pub(crate) fn inputs(&self, count: usize) -> Vec<Vec<f32>> {
@@ -70,9 +82,9 @@ fn unit() -> Argument {
     argument(&[[0.0], [1.0], [0.5], [1.0 / 255.0], [1e-6]], |rng| vec![rng.f32()])
 }
 
-/// A cosine between two directions above the horizon that a light loop would pass on.
+/// A cosine of a direction above the horizon or on it.
 fn cosine() -> Argument {
-    argument(&[[1e-4], [1.0], [0.5], [0.999_999]], |rng| vec![rng.f32().max(1e-4)])
+    argument(&[[0.0], [1e-4], [1.0], [0.5], [0.999_999]], |rng| vec![rng.f32().max(1e-4)])
 }
 
 /// A GGX roughness.
@@ -87,10 +99,18 @@ fn random_direction(rng: &mut Rng) -> Vec3 {
     vec3(r * phi.cos(), r * phi.sin(), z).normalize()
 }
 
-/// A unit vector above the horizon.
+/// A unit vector above the horizon or on it.
 fn hemisphere() -> Argument {
     argument(
-        &[[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, -0.8, 0.6], [0.8, 0.6, 1e-4], [0.48, -0.6, 0.64]],
+        &[
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 0.0],
+            [-1.0, 0.0, 0.0],
+            [0.6, 0.0, 0.8],
+            [0.0, -0.8, 0.6],
+            [0.8, 0.6, 1e-4],
+            [0.48, -0.6, 0.64],
+        ],
         |rng| {
             let d = random_direction(rng);
             vec![d.x, d.y, d.z.abs().max(1e-4)]
@@ -333,6 +353,17 @@ pub(crate) fn cases() -> Vec<Case> {
             |x| of_sym2(s2(x).clamp_eigen(x[3], x[4])),
         ),
         case("sym2_sqrt", vec![semi_definite()], |x| of_sym2(s2(x).sqrt())),
+        case("sym3_scale", vec![sggx(), argument(&[[0.0], [-1.0]], |r| vec![r.f32() * 4.0 - 2.0])], |x| {
+            columns(s3(x) * x[9])
+        }),
+        case(
+            "sym3_add_diagonal",
+            vec![sggx(), argument(&[[0.0], [-1.0]], |r| vec![r.f32() * 4.0 - 2.0])],
+            |x| {
+                let (s, d) = (s3(x), x[9]);
+                columns(Sym3 { xx: s.xx + d, yy: s.yy + d, zz: s.zz + d, ..s })
+            },
+        ),
         case("sym3_quadratic", vec![sggx(), direction()], |x| vec![s3(x).quadratic(v3(&x[9..]))]),
         case("sym3_trace", vec![sggx()], |x| vec![s3(x).trace()]),
         case("sym3_adjugate", vec![sggx()], |x| columns(s3(x).adjugate())),
@@ -367,7 +398,7 @@ pub(crate) fn cases() -> Vec<Case> {
                 vec![rust::ggx_matrix_d(v3(x), s2(&x[3..]))]
             })
         },
-        case("smith_v_of_terms", vec![unit(), unit()], |x| vec![0.5 / (x[0] + x[1]).max(f32::MIN_POSITIVE)]),
+        case("smith_v_of_terms", vec![unit(), unit()], |x| vec![0.5 / (x[0] + x[1]).max(1e-12)]),
         case("smith_v", vec![cosine(), cosine(), alpha()], |x| vec![rust::smith_v(x[0], x[1], x[2])]),
         case("smith_aniso_v", vec![hemisphere(), hemisphere(), alpha(), alpha()], |x| {
             vec![rust::smith_aniso_v(v3(x), v3(&x[3..]), x[6], x[7])]
@@ -516,6 +547,9 @@ pub(crate) fn cases() -> Vec<Case> {
         case("slope_from_normal", vec![hemisphere()], |x| of2(rust::slope_from_normal(v3(x)))),
         case("normal_from_slope", vec![plane()], |x| of3(rust::normal_from_slope(v2(x)))),
         // multiscatter
+        case("ggx_albedo_alpha", vec![hemisphere(), alpha(), alpha()], |x| {
+            vec![rust::ggx_albedo_alpha(v3(x), x[3], x[4])]
+        }),
         Case {
             relative: 4e-5,
             reason: "both polynomials cancel near alpha = 0",
@@ -526,8 +560,8 @@ pub(crate) fn cases() -> Vec<Case> {
         Case {
             relative: 1e-4,
             reason: "as ggx_directional_albedo, divided by 0.3",
-            ..case("multiscatter_compensation", vec![triple(), unit(), alpha(), alpha()], |x| {
-                of3(rust::multiscatter_compensation(v3(x), x[3], x[4], x[5]))
+            ..case("multiscatter_compensation", vec![triple(), hemisphere(), alpha(), alpha()], |x| {
+                of3(rust::multiscatter_compensation(v3(x), v3(&x[3..]), x[6], x[7]))
             })
         },
     ];

@@ -12,12 +12,12 @@ pub fn rnm(base: Vec3, detail: Vec3) -> Vec3 {
     t * (t.dot(u) / t.z) - u
 }
 
-/// The base with `rnm(base, detail) = target`, all unit normals with z ≥ 0. The talk does not say which of the two
-/// the synthesized normal is; read as `s ⊗ d`, it is the base.
+/// The base, a unit normal with z ≥ 0, whose `rnm(base, detail)` is the target or nearest to it; target and detail are
+/// such normals too. The talk does not say which of the two the synthesized normal is; read as `s ⊗ d`, it is the base.
 ///
 /// With `w = (target.xy - detail.xy, target.z + detail.z)` the base is z mirrored at w, `2 w w.z / |w|² - z`: exact.
 /// It would lie under the horizon where `|w.xy| > w.z`, which takes target and detail more than 90° apart
-/// on both sides of z; then the base on the horizon in the same direction is the answer.
+/// on both sides of z; then the best base lies on the horizon, up to 1.5° nearer than the one in the same direction.
 #[inline(always)]
 pub fn rnm_inverse(target: Vec3, detail: Vec3) -> Vec3 {
     let w = vec3(target.x - detail.x, target.y - detail.y, target.z + detail.z);
@@ -26,11 +26,40 @@ pub fn rnm_inverse(target: Vec3, detail: Vec3) -> Vec3 {
     if flat < z_squared {
         let scale = 2.0 * w.z / (flat + z_squared);
         vec3(w.x * scale, w.y * scale, (z_squared - flat) / (flat + z_squared))
-    } else if flat > 1e-12 {
-        let scale = sqrt(flat).recip();
-        vec3(w.x * scale, w.y * scale, 0.0)
     } else {
-        // Both on the horizon and opposite.
-        target
+        rnm_inverse_on_horizon(target, detail)
     }
+}
+
+/// Directions to start from: with them the best is within 22.5° of one, and the cosine below has two peaks at most.
+const COMPASS: [[f32; 2]; 8] = {
+    const R: f32 = core::f32::consts::FRAC_1_SQRT_2;
+    [[1.0, 0.0], [R, R], [0.0, 1.0], [-R, R], [-1.0, 0.0], [-R, -R], [0.0, -1.0], [R, -R]]
+};
+
+/// The base `(c, s, 0)` on the horizon with the smallest angle between `rnm(base, detail)` and `target`: the largest
+/// `s² tx dx + c² ty dy - c s (tx dy + ty dx) + c (tx dz - tz dx) + s (ty dz - tz dy)`, by Newton's steps.
+#[cold]
+fn rnm_inverse_on_horizon(t: Vec3, d: Vec3) -> Vec3 {
+    let (along, across) = (t.x * d.x - t.y * d.y, t.x * d.y + t.y * d.x);
+    let (first, second) = (t.x * d.z - t.z * d.x, t.y * d.z - t.z * d.y);
+    // But for a constant.
+    let cosine = |[c, s]: [f32; 2]| s * s * along - c * s * across + c * first + s * second;
+    let mut best = COMPASS[0];
+    for &start in &COMPASS[1..] {
+        if cosine(start) > cosine(best) {
+            best = start;
+        }
+    }
+    for _ in 0..5 {
+        let [c, s] = best;
+        let slope = 2.0 * c * s * along - (c * c - s * s) * across - s * first + c * second;
+        let bend = 2.0 * (c * c - s * s) * along + 4.0 * c * s * across - c * first - s * second;
+        // Towards the peak, also where the curve bends the other way, and no farther than to the next start.
+        let turn = (slope / bend.abs().max(1e-6)).clamp(-0.4, 0.4);
+        let (x, y) = (c - s * turn, s + c * turn);
+        let scale = sqrt(x * x + y * y).recip();
+        best = [x * scale, y * scale];
+    }
+    vec3(best[0], best[1], 0.0)
 }

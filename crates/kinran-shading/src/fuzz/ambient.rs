@@ -6,7 +6,11 @@
 //! factor and for what the product of means misses, and the light is that along the lobe's own mean
 //! direction instead of the mean over the hemisphere.
 
-use crate::{fuzz::layer::fuzz_passage, sh::Sh9, sqrt::sqrt};
+use crate::{
+    fuzz::layer::{FUZZ_COSINE_MIN, fuzz_passage},
+    sh::Sh9,
+    sqrt::sqrt,
+};
 use core::f32::consts::LOG2_E;
 use glam::{Vec2, Vec3, vec2};
 
@@ -15,18 +19,20 @@ use glam::{Vec2, Vec3, vec2};
 ///
 /// Ours: F is the limit for a dense layer and `d / n_v` that for a thin one, both exact. Within -3.6 % and
 /// +4.8 % of the closed form for every density in [0.002, 3] and every n_v ≥ 0.002; the talk's form has
-/// 17 % within d in [0.05, 0.5], n_v ≥ 0.1 and cannot follow `n_v ln n_v` at grazing.
+/// 17 % within d in [0.05, 0.5], n_v ≥ 0.1 and cannot follow `n_v ln n_v` at grazing. Finite for all n_v in [0, 1].
 pub fn fuzz_g(density: f32, n_v: f32) -> f32 {
+    let n_v = n_v.max(FUZZ_COSINE_MIN);
     let dense = 1.0 - n_v * libm::logf(1.0 + 1.0 / n_v);
     let y = density / (n_v * dense);
     let e = libm::exp2f(-LOG2_E * y);
     dense * (1.0 - e) * (1.0 - 0.1 * y * e)
 }
 
-/// The talk's form of [`fuzz_g`], `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients.
+/// The talk's form of [`fuzz_g`], `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients; zero where there
+/// are no fibres.
 pub fn fuzz_g_talk(coefficients: [f32; 4], density: f32, n_v: f32) -> f32 {
     let [c0, c1, c2, c3] = coefficients;
-    density * (1.0 + n_v * (c0 + c1 * n_v)) / (density + n_v * (c2 + c3 * n_v * n_v))
+    density * (1.0 + n_v * (c0 + c1 * n_v)) / (density + n_v * (c2 + c3 * n_v * n_v)).max(1e-20)
 }
 
 /// Share of uniform irradiance that reaches the base unscattered, `(1/π) ∫ P_p (u·n) du = 2 E_3(d)` (slide:
@@ -71,7 +77,7 @@ pub fn fuzz_ambient_place(n_v: f32, t_v: f32, t_n: f32) -> Vec2 {
 /// The factor from what the table holds at [`fuzz_ambient_place`], interpolated bilinearly: x for a thin
 /// layer, y what a dense one adds to it.
 pub fn fuzz_ambient_tabulated(texel: Vec2, density: f32, n_v: f32) -> f32 {
-    texel.x + texel.y * density / (density + n_v)
+    texel.x + texel.y * density / (density + n_v).max(1e-20)
 }
 
 /// Mean direction of the light that the lobe gathers, `∫ p g u du / ∫ p g du`, shorter than one; by four

@@ -5,17 +5,22 @@ use crate::sqrt::sqrt;
 use core::f32::consts::{LOG2_E, PI};
 use glam::Vec3;
 
-/// Share of light that passes the layer along a direction at cosine `n_w` to the normal without meeting a
+/// Cosines below this one, of light or view and normal, count as it: a layer of density 1e-4 lets nothing pass there,
+/// and quotients stay finite at the horizon.
+pub const FUZZ_COSINE_MIN: f32 = 1e-6;
+
+/// Share of light that passes the layer along a direction at cosine `n_w` ≥ 0 to the normal without meeting a
 /// fibre: `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
 pub fn fuzz_passage(density: f32, n_w: f32) -> f32 {
-    libm::exp2f(-LOG2_E * density / n_w)
+    libm::exp2f(-LOG2_E * density / n_w.max(FUZZ_COSINE_MIN))
 }
 
 /// The layer's BRDF for a fibre albedo of one (slide: New Model): `p (1 - passed) / (n_u + n_v)`, where
 /// `passed` is [`fuzz_passage`] along the light times that along the view, and `phase` the phase function.
-/// Both cosines must be positive. Single precision leaves a relative error of 6e-8 / density.
+/// For cosines ≥ 0; where both vanish the BRDF is infinite, and this is its value at [`FUZZ_COSINE_MIN`]. Single
+/// precision leaves a relative error of 6e-8 / density.
 pub fn fuzz_layer(phase: f32, passed: f32, n_u: f32, n_v: f32) -> f32 {
-    phase * (1.0 - passed) / (n_u + n_v)
+    phase * (1.0 - passed) / (n_u + n_v).max(FUZZ_COSINE_MIN)
 }
 
 /// BRDF of a layer of SGGX fibres for an albedo of one, per steradian, zero below the horizon; `u` light, `v` view and
@@ -57,13 +62,13 @@ pub fn fuzz_reciprocal_brdf(u: Vec3, v: Vec3, t: Vec3, density: f32, alpha: f32)
 /// What the layer's lobe needs of a view, once a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FuzzView {
-    /// Cosine of view and normal.
+    /// Cosine of view and normal, at least [`FUZZ_COSINE_MIN`].
     pub n_v: f32,
     /// Cosine of view and fibre.
     pub t_v: f32,
     /// `P_e`: the share of the base's light that reaches the viewer.
     pub escaped: f32,
-    /// `-d log2(e)`.
+    /// `-d log2(e)`, below zero also for a density of zero.
     pub exponent: f32,
     /// `(1-α²) / 2α²`.
     pub squeeze: f32,
@@ -82,9 +87,11 @@ pub struct FuzzLight {
     pub penetrated: f32,
 }
 
-/// Prepares [`fuzz_light`] for a view at cosine `n_v` > 0 to the normal and `t_v` to the fibres.
+/// Prepares [`fuzz_light`] for a view at cosine `n_v` ≥ 0 to the normal and `t_v` to the fibres.
 pub fn fuzz_view(n_v: f32, t_v: f32, density: f32, alpha: f32) -> FuzzView {
-    let exponent = -LOG2_E * density;
+    // Over a light's cosine of zero it is infinite and the power zero; a zero would be none over it.
+    let exponent = -LOG2_E * density.max(1e-20);
+    let n_v = n_v.max(FUZZ_COSINE_MIN);
     let alpha_sqr = alpha * alpha;
     let k = 1.0 - alpha_sqr;
     let root = 16.0 * PI * PI * alpha_sqr;
@@ -99,7 +106,7 @@ pub fn fuzz_view(n_v: f32, t_v: f32, density: f32, alpha: f32) -> FuzzView {
     }
 }
 
-/// Lobe and penetration for a light at cosines `n_u` > 0 to the normal, `t_u` to the fibres and `u_v` to the
+/// Lobe and penetration for a light at cosines `n_u` ≥ 0 to the normal, `t_u` to the fibres and `u_v` to the
 /// view: [`fuzz_brdf`] with one exponential for both and all that is known of the view drawn together. The cosines
 /// are the same in every frame.
 pub fn fuzz_light(view: FuzzView, n_u: f32, t_u: f32, u_v: f32) -> FuzzLight {
@@ -123,7 +130,7 @@ pub fn fuzz_attenuation(penetrated: f32, escaped: f32, downward: f32, fibre_colo
 }
 
 /// The normal for the layer, between the normal-mapped `n` and the mesh's `vertex_normal` (slide: Deferred):
-/// `smoothness` 0 keeps `n`, 1 takes the mesh's.
+/// `smoothness` 0 keeps `n`, 1 takes the mesh's. They are less than 180° apart.
 pub fn fuzz_smooth_normal(n: Vec3, vertex_normal: Vec3, smoothness: f32) -> Vec3 {
     (n + (vertex_normal - n) * smoothness).normalize()
 }

@@ -30,7 +30,7 @@ pub use deferred::{
     fuzz_deferred, fuzz_deferred_color, fuzz_deferred_escape, fuzz_wrap, fuzziness_code, fuzziness_from_code,
 };
 pub use layer::{
-    FuzzLight, FuzzView, fuzz_attenuation, fuzz_brdf, fuzz_layer, fuzz_light, fuzz_passage,
+    FUZZ_COSINE_MIN, FuzzLight, FuzzView, fuzz_attenuation, fuzz_brdf, fuzz_layer, fuzz_light, fuzz_passage,
     fuzz_reciprocal_brdf, fuzz_smooth_normal, fuzz_velvet_brdf, fuzz_view,
 };
 pub use p_s::{fibre_p_s, fuzz_p_s};

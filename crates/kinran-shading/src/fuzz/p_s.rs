@@ -29,7 +29,7 @@ pub fn fibre_p_s(n_u: f32, t_u: f32, t_n: f32, alpha: f32) -> f32 {
     }
     let slope = (3.0 * l + 2.0 * b2) * l + b1;
     let area_sqr = 1.0 - k * t_u * t_u;
-    let upward = l * sqrt((l + n_u) * (l + a2 * n_u / area_sqr)) / slope.max(1e-20);
+    let upward = l * sqrt(((l + n_u) * (l + a2 * n_u / area_sqr)).max(0.0)) / slope.max(1e-20);
     (1.0 - upward).clamp(0.0, 1.0)
 }
 

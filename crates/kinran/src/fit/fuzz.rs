@@ -79,6 +79,10 @@ struct Report<'a> {
     /// The table's smallest and largest value over the exact one.
     #[serde(skip_serializing_if = "Option::is_none")]
     table: Option<[f32; 2]>,
+    /// [`FuzzFit::returned`].
+    returned: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    warning: Option<&'a str>,
 }
 
 /// The command.
@@ -106,13 +110,24 @@ pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
     if let Some(path) = &args.plots {
         write_atomically(path, phase_plots(&fit).as_bytes())?;
     }
-    let report = Report { fit: &fit, table: tabulated };
+    let returned = fit.returned();
+    let warning = (returned > 1.0).then(|| {
+        let instead = match phase {
+            Phase::Fibre => "; take fibre_p_s in their place",
+            Phase::Velvet => "",
+        };
+        format!(
+            "the coefficients of p_s make energy: white fibres over white send back up to {returned:.3} of a light{instead}"
+        )
+    });
+    let warning = warning.as_deref();
+    let report = Report { fit: &fit, table: tabulated, returned, warning };
     match args.lang {
         // Constants are what was asked for, not a summary of it.
         Some(language) => {
-            Console { quiet: false, ..console.clone() }.result(&report, &constants(&fit, language))
+            Console { quiet: false, ..console.clone() }.result(&report, &constants(&fit, warning, language))
         }
-        None => console.result(&report, &text(&fit, tabulated)),
+        None => console.result(&report, &text(&fit, tabulated, warning)),
     }
 }
 
@@ -149,7 +164,7 @@ fn rows(fit: &FuzzFit) -> [(&'static str, Vec<f32>, [f32; 4]); 7] {
     ]
 }
 
-fn text(fit: &FuzzFit, tabulated: Option<[f32; 2]>) -> String {
+fn text(fit: &FuzzFit, tabulated: Option<[f32; 2]>, warning: Option<&str>) -> String {
     let header = ["", "error", "rms", "low", "high", "coefficients"].map(str::to_owned).to_vec();
     let mut cells = vec![header];
     for (name, coefficients, [max, rms, low, high]) in rows(fit) {
@@ -172,6 +187,9 @@ fn text(fit: &FuzzFit, tabulated: Option<[f32; 2]>) -> String {
         writeln!(text, "\ntable of the ambient factor: {low:.3} to {high:.3} of the exact value")
             .expect("strings grow");
     }
+    if let Some(warning) = warning {
+        writeln!(text, "\nwarning: {warning}").expect("strings grow");
+    }
     text += "
 error and rms: the largest difference from the exact value, and the root of its mean square
 low and high: the smallest and largest value over the exact one
@@ -179,7 +197,7 @@ ambient holds for densities of 0.05 to 0.5 and n·v from 0.1 on; g, q and b are 
     text
 }
 
-fn constants(fit: &FuzzFit, language: FuzzLanguage) -> String {
+fn constants(fit: &FuzzFit, warning: Option<&str>, language: FuzzLanguage) -> String {
     let number = |x: &f32| format!("{x:?}");
     let mut text = format!("// {}.\n", title(fit));
     let scalar = |name: &str, value: f32| match language {
@@ -196,6 +214,9 @@ fn constants(fit: &FuzzFit, language: FuzzLanguage) -> String {
             format!(", {low:.3} to {high:.3} of the exact value")
         };
         writeln!(text, "// {name}: error {max:.4}, RMS {rms:.4}{ratio}.").expect("strings grow");
+        if let Some(warning) = warning.filter(|_| name == "p_s") {
+            writeln!(text, "// Warning: {warning}.").expect("strings grow");
+        }
         let name = format!("FUZZ_{}", name.to_uppercase());
         if let [value] = coefficients[..] {
             text += &scalar(&name, value);

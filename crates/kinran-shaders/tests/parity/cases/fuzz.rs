@@ -9,11 +9,7 @@ fn fibre_alpha() -> Argument {
 }
 
 fn density() -> Argument {
-    argument(&[[0.0], [0.05], [0.5], [2.0]], |r| vec![r.f32()])
-}
-
-fn positive_density() -> Argument {
-    argument(&[[0.01], [0.05], [0.5], [3.0]], |r| vec![r.f32().max(0.01)])
+    argument(&[[0.0], [0.05], [0.5], [3.0]], |r| vec![r.f32()])
 }
 
 /// Schlick's k.
@@ -26,14 +22,23 @@ fn signed_cosine() -> Argument {
     argument(&[[0.0], [1.0], [-1.0], [0.5]], |r| vec![r.f32() * 2.0 - 1.0])
 }
 
-/// Cosine of a light above the horizon, which is no less than 1e-3 to a shader's light loop.
+/// Cosine of a direction above the horizon or on it; no less than 1e-3 to a shader's light loop.
 fn lit_cosine() -> Argument {
-    argument(&[[1e-3], [1.0], [0.5]], |r| vec![r.f32().max(1e-3)])
+    argument(&[[0.0], [1e-3], [1.0], [0.5]], |r| vec![r.f32().max(1e-3)])
 }
 
 /// u·v, t·u and t·v of three directions, where light and view share a hemisphere.
 fn phase_cosines() -> Argument {
-    argument(&[[1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.5, 0.3, 0.2]], |r| {
+    let edges = [
+        [1.0, 1.0, 1.0],
+        [1.0, -1.0, -1.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [-1.0, 0.0, 0.0],
+        [-1.0, 1.0, -1.0],
+        [-0.5, 0.3, 0.2],
+    ];
+    argument(&edges, |r| {
         let (u, v, t) = (random_direction(r), random_direction(r), random_direction(r));
         vec![u.dot(v).max(-0.9), t.dot(u), t.dot(v)]
     })
@@ -41,16 +46,34 @@ fn phase_cosines() -> Argument {
 
 /// n·u, t·u and t·n of two directions above the horizon.
 fn fibre_cosines() -> Argument {
-    argument(&[[1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.01, 0.0, 1.0], [0.5, 0.6, 0.8]], |r| {
+    let edges = [
+        [1.0, 1.0, 1.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 1.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.01, 0.0, 1.0],
+        [0.5, 0.6, 0.8],
+    ];
+    argument(&edges, |r| {
         let (u, t) = (random_direction(r), random_direction(r));
         let u = vec3(u.x, u.y, u.z.abs().max(1e-3)).normalize();
         vec![u.z, t.dot(u), t.z]
     })
 }
 
-/// A direction above the horizon by a degree at least.
+/// A direction above the horizon, by a degree at least, or on it.
 fn above() -> Argument {
-    argument(&[[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, -0.8, 0.6], [0.48, -0.6, 0.64]], |r| {
+    let edges = [
+        [0.0, 0.0, 1.0],
+        [1.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.6, 0.0, 0.8],
+        [0.0, -0.8, 0.6],
+        [0.48, -0.6, 0.64],
+    ];
+    argument(&edges, |r| {
         let d = random_direction(r);
         vec3(d.x, d.y, d.z.abs().max(0.02)).normalize().to_array().to_vec()
     })
@@ -69,8 +92,15 @@ fn view() -> Argument {
         let (n_v, t_v) = (r.f32().max(0.01), r.f32() * 2.0 - 1.0);
         of_view(fuzz::fuzz_view(n_v, t_v, r.f32().max(0.01), r.f32().max(0.1)))
     });
-    argument.edges =
-        vec![of_view(fuzz::fuzz_view(1.0, 1.0, 0.5, 0.95)), of_view(fuzz::fuzz_view(0.05, 0.0, 0.1, 0.1))];
+    argument.edges = [
+        (1.0, 1.0, 0.5, 0.95),
+        (0.05, 0.0, 0.1, 0.1),
+        (0.0, 0.0, 0.0, 0.1),
+        (0.0, 1.0, 3.0, 1.0),
+        (1.0, -1.0, 0.0, 0.1),
+    ]
+    .map(|(n_v, t_v, density, alpha)| of_view(fuzz::fuzz_view(n_v, t_v, density, alpha)))
+    .to_vec();
     argument
 }
 
@@ -79,7 +109,8 @@ fn of_view(v: FuzzView) -> Vec<f32> {
 }
 
 fn random_numbers() -> Argument {
-    argument(&[[0.0, 0.0], [0.5, 0.5], [0.25, 0.9]], |r| vec![r.f32(), r.f32()])
+    const LAST: f32 = 1.0 - f32::EPSILON / 2.0;
+    argument(&[[0.0, 0.0], [LAST, LAST], [0.5, 0.5], [0.25, 0.9]], |r| vec![r.f32(), r.f32()])
 }
 
 fn array<const N: usize>(x: &[f32]) -> [f32; N] {
@@ -114,7 +145,10 @@ pub(super) fn cases() -> Vec<Case> {
             reason: SINE,
             ..case(
                 "fibre_direction",
-                vec![argument(&[[0.0], [1.57]], |r| vec![r.f32() * 1.57]), signed_cosine()],
+                vec![
+                    argument(&[[0.0], [core::f32::consts::FRAC_PI_2]], |r| vec![r.f32() * 1.57]),
+                    signed_cosine(),
+                ],
                 |x| of3(fuzz::fibre_direction(x[0], x[1])),
             )
         },
@@ -164,7 +198,7 @@ pub(super) fn cases() -> Vec<Case> {
                 view(),
                 lit_cosine(),
                 signed_cosine(),
-                argument(&[[1.0], [0.0]], |r| vec![r.f32() * 1.9 - 0.9]),
+                argument(&[[1.0], [0.0], [-1.0]], |r| vec![r.f32() * 1.9 - 0.9]),
             ],
             |x| {
                 let view = FuzzView {
@@ -217,7 +251,7 @@ pub(super) fn cases() -> Vec<Case> {
             vec![fuzz::fuzz_p_s(array(x), x[6], x[7])]
         }),
         // ambient
-        exponential("fuzz_g", vec![positive_density(), lit_cosine()], |x| vec![fuzz::fuzz_g(x[0], x[1])]),
+        exponential("fuzz_g", vec![density(), lit_cosine()], |x| vec![fuzz::fuzz_g(x[0], x[1])]),
         Case {
             relative: 1e-4,
             reason: "the denominator may cancel for random coefficients",
@@ -227,7 +261,7 @@ pub(super) fn cases() -> Vec<Case> {
                     argument(&[[-0.67, 0.08, 0.82, -0.44]], |r| {
                         vec![r.f32() - 1.0, r.f32() * 0.5, 0.6 + 0.3 * r.f32(), -0.4 * r.f32()]
                     }),
-                    positive_density(),
+                    density(),
                     lit_cosine(),
                 ],
                 |x| vec![fuzz::fuzz_g_talk(array(x), x[4], x[5])],
@@ -246,9 +280,9 @@ pub(super) fn cases() -> Vec<Case> {
             ..case(
                 "fuzz_ambient_place",
                 vec![
-                    argument(&[[0.5], [0.9]], |r| vec![r.f32() * 0.98]),
+                    argument(&[[0.0], [0.5], [0.9], [1.0]], |r| vec![r.f32() * 0.98]),
                     signed_cosine(),
-                    argument(&[[0.5], [0.0]], |r| vec![r.f32() * 0.98]),
+                    argument(&[[0.5], [0.0], [1.0]], |r| vec![r.f32() * 0.98]),
                 ],
                 |x| of2(fuzz::fuzz_ambient_place(x[0], x[1], x[2])),
             )
@@ -276,7 +310,7 @@ pub(super) fn cases() -> Vec<Case> {
             vec![
                 signed_cosine(),
                 lit_cosine(),
-                argument(&[[0.0], [1.0]], |r| vec![r.f32() * 1.9 - 0.9]),
+                argument(&[[0.0], [1.0], [-1.0]], |r| vec![r.f32() * 1.9 - 0.9]),
                 unit(),
             ],
             |x| vec![fuzz::fuzz_deferred(x[0], x[1], x[2], x[3])],
