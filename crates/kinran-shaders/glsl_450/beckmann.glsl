@@ -41,7 +41,7 @@ float beckmann_aniso_d(vec3 h, float sigma_t, float sigma_b) {
 
 /// Slope towards which a unit normal with z ≥ 0 leans: `n.xy / n.z`, a million at most.
 ///
-/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
 vec2 slope_from_normal(vec3 n) {
     return n.xy / vec2(max(n.z, 1e-6));
 }

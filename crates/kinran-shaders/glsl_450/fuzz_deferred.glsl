@@ -39,7 +39,7 @@ float fuzz_wrap(float n_u) {
 
 /// P_e of the deferred layer, once a pixel.
 ///
-/// Cost on GCN: 3 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
 float fuzz_deferred_escape(float n_v) {
     float _e2 = fuzz_passage(FUZZ_DEFERRED_DENSITY, n_v);
     return _e2;
@@ -54,8 +54,7 @@ float fuzz_deferred_escape(float n_v) {
 float fuzz_deferred(float n_u, float n_v, float u_v, float escaped) {
     float c = max((n_u + FUZZ_WRAP), 0.0001);
     float wrapped = c * c;
-    float _e11 = fuzz_passage(0.57600003, wrapped);
-    float passed = _e11 * escaped;
+    float passed = exp2((-0.8309924 / wrapped)) * escaped;
     float w = 1.000001 + u_v;
     float s = n_u + n_v;
     float m = ((s * s) * 0.055555534) + w;

@@ -36,7 +36,7 @@ const float FUZZ_COSINE_MIN = 1e-6;
 /// Share of light that passes the layer along a direction at cosine `n_w` ≥ 0 to the normal without meeting a fibre:
 /// `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
 ///
-/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 5 instructions (2 at a quarter of the rate).
 float fuzz_passage(float density, float n_w) {
     return exp2(((-1.442695 * density) / max(n_w, FUZZ_COSINE_MIN)));
 }
@@ -45,7 +45,7 @@ float fuzz_passage(float density, float n_w) {
 /// `fuzz_passage` along the light times that along the view, and `phase` the phase function; for cosines ≥ 0. Where both
 /// vanish the BRDF is infinite, and this is its value at FUZZ_COSINE_MIN.
 ///
-/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 6 instructions (1 at a quarter of the rate).
 float fuzz_layer(float phase, float passed, float n_u, float n_v) {
     return (phase * (1.0 - passed)) / max((n_u + n_v), FUZZ_COSINE_MIN);
 }
@@ -54,7 +54,7 @@ float fuzz_layer(float phase, float passed, float n_u, float n_v) {
 /// `t` fibre direction are unit vectors in a frame with z along the normal. Not reciprocal: `f(u, v) σ(u) = f(v, u)
 /// σ(v)`.
 ///
-/// Cost on GCN: 41 instructions (6 at a quarter of the rate).
+/// Cost on GCN: 44 instructions (6 at a quarter of the rate).
 float fuzz_brdf(vec3 u, vec3 v, vec3 t, float density, float alpha) {
     float _e6 = fuzz_passage(density, u.z);
     float _e8 = fuzz_passage(density, v.z);
@@ -66,7 +66,7 @@ float fuzz_brdf(vec3 u, vec3 v, vec3 t, float density, float alpha) {
 
 /// `fuzz_brdf` with the velvet phase of asymmetry `k`; reciprocal.
 ///
-/// Cost on GCN: 42 instructions (9 at a quarter of the rate).
+/// Cost on GCN: 45 instructions (9 at a quarter of the rate).
 float fuzz_velvet_brdf(vec3 u, vec3 v, vec3 t, float density, float k) {
     float _e6 = fuzz_passage(density, u.z);
     float _e8 = fuzz_passage(density, v.z);
@@ -79,7 +79,7 @@ float fuzz_velvet_brdf(vec3 u, vec3 v, vec3 t, float density, float k) {
 /// BRDF of a layer whose extinction follows the fibres' projected area, as in a true microflake volume:
 /// `D/4 (1 - e^(-d (σ_u/n_u + σ_v/n_v))) / (σ_v n_u + σ_u n_v)`. Reciprocal.
 ///
-/// Cost on GCN: 52 instructions (8 at a quarter of the rate).
+/// Cost on GCN: 54 instructions (8 at a quarter of the rate).
 float fuzz_reciprocal_brdf(vec3 u, vec3 v, vec3 t, float density, float alpha) {
     vec3 h = normalize((u + v));
     float _e8 = fibre_projected_area(dot(t, u), alpha);
@@ -94,7 +94,7 @@ float fuzz_reciprocal_brdf(vec3 u, vec3 v, vec3 t, float density, float alpha) {
 
 /// Prepares `fuzz_light` for a view at cosine `n_v` ≥ 0 to the normal and `t_v` to the fibres.
 ///
-/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
+/// Cost on GCN: 13 instructions (3 at a quarter of the rate).
 FuzzView fuzz_view(float n_v, float t_v, float density, float alpha) {
     float exponent = -1.442695 * max(density, 1e-20);
     float n = max(n_v, FUZZ_COSINE_MIN);

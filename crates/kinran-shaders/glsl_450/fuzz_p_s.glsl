@@ -27,7 +27,7 @@ float fibre_p_s_step(float l, float constant, float linear, float square) {
 /// of `χ = λ³ + (α² c + 2 k t_u t_n) λ² - (α² + k (1 - t_u² - t_n²)) λ - α² c`, `c = n_u`, `k = 1 - α²`,
 /// `1 - P_s = λ sqrt((λ + c) (λ + α² c/σ²)) / χ'(λ)`. Laguerre's iteration from 1 falls on λ.
 ///
-/// Cost on GCN: 91 instructions (11 at a quarter of the rate).
+/// Cost on GCN: 92 instructions (11 at a quarter of the rate).
 float fibre_p_s(float n_u, float t_u, float t_n, float alpha) {
     float alpha_sqr = alpha * alpha;
     float k = 1.0 - alpha_sqr;

@@ -111,11 +111,15 @@ vec3 sym2_sqrt(vec3 a) {
 }
 
 /// `k A`. Column by column: a matrix times a number, which HLSL writes `mul(k, A)`, is refused by Slang for WGSL.
+///
+/// Cost on GCN: 9 instructions.
 mat3 sym3_scale(mat3 a, float k) {
     return mat3((a[0] * k), (a[1] * k), (a[2] * k));
 }
 
 /// `A + d I`.
+///
+/// Cost on GCN: 3 instructions.
 mat3 sym3_add_diagonal(mat3 a, float d) {
     return mat3((a[0] + vec3(d, 0.0, 0.0)), (a[1] + vec3(0.0, d, 0.0)), (a[2] + vec3(0.0, 0.0, d)));
 }

@@ -41,7 +41,7 @@ float beckmann_aniso_d(vec3 h, float sigma_t, float sigma_b) {
 
 /// Slope towards which a unit normal with z ≥ 0 leans: `n.xy / n.z`, a million at most.
 ///
-/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
 vec2 slope_from_normal(vec3 n) {
     return n.xy / vec2(max(n.z, 1e-6));
 }
@@ -246,7 +246,7 @@ float fibre_p_s_step(float l, float constant, float linear, float square) {
 /// of `χ = λ³ + (α² c + 2 k t_u t_n) λ² - (α² + k (1 - t_u² - t_n²)) λ - α² c`, `c = n_u`, `k = 1 - α²`,
 /// `1 - P_s = λ sqrt((λ + c) (λ + α² c/σ²)) / χ'(λ)`. Laguerre's iteration from 1 falls on λ.
 ///
-/// Cost on GCN: 91 instructions (11 at a quarter of the rate).
+/// Cost on GCN: 92 instructions (11 at a quarter of the rate).
 float fibre_p_s(float n_u, float t_u, float t_n, float alpha) {
     float alpha_sqr = alpha * alpha;
     float k = 1.0 - alpha_sqr;
@@ -402,7 +402,7 @@ const float FUZZ_COSINE_MIN = 1e-6;
 /// Share of light that passes the layer along a direction at cosine `n_w` ≥ 0 to the normal without meeting a fibre:
 /// `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
 ///
-/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 5 instructions (2 at a quarter of the rate).
 float fuzz_passage(float density, float n_w) {
     return exp2(((-1.442695 * density) / max(n_w, FUZZ_COSINE_MIN)));
 }
@@ -411,7 +411,7 @@ float fuzz_passage(float density, float n_w) {
 /// `fuzz_passage` along the light times that along the view, and `phase` the phase function; for cosines ≥ 0. Where both
 /// vanish the BRDF is infinite, and this is its value at FUZZ_COSINE_MIN.
 ///
-/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 6 instructions (1 at a quarter of the rate).
 float fuzz_layer(float phase, float passed, float n_u, float n_v) {
     return (phase * (1.0 - passed)) / max((n_u + n_v), FUZZ_COSINE_MIN);
 }
@@ -420,7 +420,7 @@ float fuzz_layer(float phase, float passed, float n_u, float n_v) {
 /// `t` fibre direction are unit vectors in a frame with z along the normal. Not reciprocal: `f(u, v) σ(u) = f(v, u)
 /// σ(v)`.
 ///
-/// Cost on GCN: 41 instructions (6 at a quarter of the rate).
+/// Cost on GCN: 44 instructions (6 at a quarter of the rate).
 float fuzz_brdf(vec3 u, vec3 v, vec3 t, float density, float alpha) {
     float _e6 = fuzz_passage(density, u.z);
     float _e8 = fuzz_passage(density, v.z);
@@ -432,7 +432,7 @@ float fuzz_brdf(vec3 u, vec3 v, vec3 t, float density, float alpha) {
 
 /// `fuzz_brdf` with the velvet phase of asymmetry `k`; reciprocal.
 ///
-/// Cost on GCN: 42 instructions (9 at a quarter of the rate).
+/// Cost on GCN: 45 instructions (9 at a quarter of the rate).
 float fuzz_velvet_brdf(vec3 u, vec3 v, vec3 t, float density, float k) {
     float _e6 = fuzz_passage(density, u.z);
     float _e8 = fuzz_passage(density, v.z);
@@ -445,7 +445,7 @@ float fuzz_velvet_brdf(vec3 u, vec3 v, vec3 t, float density, float k) {
 /// BRDF of a layer whose extinction follows the fibres' projected area, as in a true microflake volume:
 /// `D/4 (1 - e^(-d (σ_u/n_u + σ_v/n_v))) / (σ_v n_u + σ_u n_v)`. Reciprocal.
 ///
-/// Cost on GCN: 52 instructions (8 at a quarter of the rate).
+/// Cost on GCN: 54 instructions (8 at a quarter of the rate).
 float fuzz_reciprocal_brdf(vec3 u, vec3 v, vec3 t, float density, float alpha) {
     vec3 h = normalize((u + v));
     float _e8 = fibre_projected_area(dot(t, u), alpha);
@@ -460,7 +460,7 @@ float fuzz_reciprocal_brdf(vec3 u, vec3 v, vec3 t, float density, float alpha) {
 
 /// Prepares `fuzz_light` for a view at cosine `n_v` ≥ 0 to the normal and `t_v` to the fibres.
 ///
-/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
+/// Cost on GCN: 13 instructions (3 at a quarter of the rate).
 FuzzView fuzz_view(float n_v, float t_v, float density, float alpha) {
     float exponent = -1.442695 * max(density, 1e-20);
     float n = max(n_v, FUZZ_COSINE_MIN);
@@ -531,7 +531,7 @@ const float FUZZ_COMBED_ALPHA = 0.3;
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
 /// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002; finite for all n_v in [0, 1].
 ///
-/// Cost on GCN: 15 instructions (4 at a quarter of the rate).
+/// Cost on GCN: 16 instructions (4 at a quarter of the rate).
 float fuzz_g(float density, float n_v) {
     float x = max(n_v, FUZZ_COSINE_MIN);
     float dense = 1.0 - (x * log((1.0 + (1.0 / x))));
@@ -543,7 +543,7 @@ float fuzz_g(float density, float n_v) {
 /// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients; zero where there are
 /// no fibres.
 ///
-/// Cost on GCN: 8 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 float fuzz_g_talk(float coefficients[4], float density, float n_v) {
     float above = 1.0 + (n_v * (coefficients[0] + (coefficients[1] * n_v)));
     return (density * above) / max((density + (n_v * (coefficients[2] + ((coefficients[3] * n_v) * n_v)))), 1e-20);
@@ -589,7 +589,7 @@ vec2 fuzz_ambient_place(float n_v, float t_v, float t_n) {
 /// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a
 /// dense one adds to it.
 ///
-/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 float fuzz_ambient_tabulated(vec2 texel, float density, float n_v) {
     return texel.x + ((texel.y * density) / max((density + n_v), 1e-20));
 }
@@ -669,7 +669,7 @@ float fuzz_wrap(float n_u) {
 
 /// P_e of the deferred layer, once a pixel.
 ///
-/// Cost on GCN: 3 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
 float fuzz_deferred_escape(float n_v) {
     float _e2 = fuzz_passage(FUZZ_DEFERRED_DENSITY, n_v);
     return _e2;
@@ -684,8 +684,7 @@ float fuzz_deferred_escape(float n_v) {
 float fuzz_deferred(float n_u, float n_v, float u_v, float escaped) {
     float c = max((n_u + FUZZ_WRAP), 0.0001);
     float wrapped = c * c;
-    float _e11 = fuzz_passage(0.57600003, wrapped);
-    float passed = _e11 * escaped;
+    float passed = exp2((-0.8309924 / wrapped)) * escaped;
     float w = 1.000001 + u_v;
     float s = n_u + n_v;
     float m = ((s * s) * 0.055555534) + w;
@@ -748,6 +747,8 @@ float ggx_directional_albedo(float n_v, float alpha) {
 /// counts, towards which facets send most light: `(alpha_t² + alpha_b² + 0.8 (alpha_t² - alpha_b²) (v.y⁴ - v.x⁴)) / 2`.
 /// RMS error of the albedo 0.019 over random pairs in [0.05, 1] and all views, worst 0.32 at a flat view across the pair
 /// (1, 0.05).
+///
+/// Cost on GCN: 10 instructions (1 at a quarter of the rate).
 float ggx_albedo_alpha(vec3 v, float alpha_t, float alpha_b) {
     float t = alpha_t * alpha_t;
     float b = alpha_b * alpha_b;
@@ -761,7 +762,7 @@ float ggx_albedo_alpha(vec3 v, float alpha_t, float alpha_b) {
 /// the view alone, so the compensated lobe is not reciprocal. An anisotropic lobe uses the isotropic albedo at
 /// `ggx_albedo_alpha`.
 ///
-/// Cost on GCN: 38 instructions (3 at a quarter of the rate).
+/// Cost on GCN: 44 instructions (3 at a quarter of the rate).
 vec3 multiscatter_compensation(vec3 f0_, vec3 v, float alpha_t, float alpha_b) {
     float _e6 = ggx_albedo_alpha(v, alpha_t, alpha_b);
     float _e7 = ggx_directional_albedo(clamp(v.z, 0.0, 1.0), _e6);
@@ -935,11 +936,15 @@ vec3 sym2_sqrt(vec3 a) {
 }
 
 /// `k A`. Column by column: a matrix times a number, which HLSL writes `mul(k, A)`, is refused by Slang for WGSL.
+///
+/// Cost on GCN: 9 instructions.
 mat3 sym3_scale(mat3 a, float k) {
     return mat3((a[0] * k), (a[1] * k), (a[2] * k));
 }
 
 /// `A + d I`.
+///
+/// Cost on GCN: 3 instructions.
 mat3 sym3_add_diagonal(mat3 a, float d) {
     return mat3((a[0] + vec3(d, 0.0, 0.0)), (a[1] + vec3(0.0, d, 0.0)), (a[2] + vec3(0.0, 0.0, d)));
 }

@@ -44,7 +44,7 @@ float beckmann_aniso_d(float3 h, float sigma_t, float sigma_b)
 
 /// Slope towards which a unit normal with z ≥ 0 leans: `n.xy / n.z`, a million at most.
 ///
-/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
 float2 slope_from_normal(float3 n)
 {
     return n.xy / (max(n.z, 1e-6)).xx;

@@ -134,12 +134,16 @@ float3 sym2_sqrt(float3 a)
 }
 
 /// `k A`. Column by column: a matrix times a number, which HLSL writes `mul(k, A)`, is refused by Slang for WGSL.
+///
+/// Cost on GCN: 9 instructions.
 float3x3 sym3_scale(float3x3 a, float k)
 {
     return float3x3((a[0] * k), (a[1] * k), (a[2] * k));
 }
 
 /// `A + d I`.
+///
+/// Cost on GCN: 3 instructions.
 float3x3 sym3_add_diagonal(float3x3 a, float d)
 {
     return float3x3((a[0] + float3(d, 0.0, 0.0)), (a[1] + float3(0.0, d, 0.0)), (a[2] + float3(0.0, 0.0, d)));

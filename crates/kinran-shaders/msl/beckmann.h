@@ -51,7 +51,7 @@ inline float beckmann_aniso_d(
 
 /// Slope towards which a unit normal with z ≥ 0 leans: `n.xy / n.z`, a million at most.
 ///
-/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
 inline metal::float2 slope_from_normal(
     metal::float3 n
 ) {

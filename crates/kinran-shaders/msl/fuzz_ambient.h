@@ -56,7 +56,7 @@ constant float FUZZ_COMBED_ALPHA = 0.3;
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
 /// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002; finite for all n_v in [0, 1].
 ///
-/// Cost on GCN: 15 instructions (4 at a quarter of the rate).
+/// Cost on GCN: 16 instructions (4 at a quarter of the rate).
 inline float fuzz_g(
     float density,
     float n_v
@@ -71,7 +71,7 @@ inline float fuzz_g(
 /// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients; zero where there are
 /// no fibres.
 ///
-/// Cost on GCN: 8 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 inline float fuzz_g_talk(
     Float4Array coefficients,
     float density,
@@ -134,7 +134,7 @@ inline metal::float2 fuzz_ambient_place(
 /// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a
 /// dense one adds to it.
 ///
-/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 inline float fuzz_ambient_tabulated(
     metal::float2 texel,
     float density,

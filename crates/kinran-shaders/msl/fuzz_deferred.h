@@ -43,7 +43,7 @@ inline float fuzz_wrap(
 
 /// P_e of the deferred layer, once a pixel.
 ///
-/// Cost on GCN: 3 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
 inline float fuzz_deferred_escape(
     float n_v
 ) {
@@ -65,8 +65,7 @@ inline float fuzz_deferred(
 ) {
     float c = metal::max(n_u + FUZZ_WRAP, 0.0001);
     float wrapped = c * c;
-    float _e11 = fuzz_passage(0.57600003, wrapped);
-    float passed = _e11 * escaped;
+    float passed = metal::exp2(-0.8309924 / wrapped) * escaped;
     float w = 1.000001 + u_v;
     float s = n_u + n_v;
     float m = ((s * s) * 0.055555534) + w;

@@ -38,7 +38,7 @@ constant float FUZZ_COSINE_MIN = 0.000001;
 /// Share of light that passes the layer along a direction at cosine `n_w` ≥ 0 to the normal without meeting a fibre:
 /// `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
 ///
-/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 5 instructions (2 at a quarter of the rate).
 inline float fuzz_passage(
     float density,
     float n_w
@@ -50,7 +50,7 @@ inline float fuzz_passage(
 /// `fuzz_passage` along the light times that along the view, and `phase` the phase function; for cosines ≥ 0. Where both
 /// vanish the BRDF is infinite, and this is its value at FUZZ_COSINE_MIN.
 ///
-/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 6 instructions (1 at a quarter of the rate).
 inline float fuzz_layer(
     float phase,
     float passed,
@@ -64,7 +64,7 @@ inline float fuzz_layer(
 /// `t` fibre direction are unit vectors in a frame with z along the normal. Not reciprocal: `f(u, v) σ(u) = f(v, u)
 /// σ(v)`.
 ///
-/// Cost on GCN: 41 instructions (6 at a quarter of the rate).
+/// Cost on GCN: 44 instructions (6 at a quarter of the rate).
 inline float fuzz_brdf(
     metal::float3 u,
     metal::float3 v,
@@ -82,7 +82,7 @@ inline float fuzz_brdf(
 
 /// `fuzz_brdf` with the velvet phase of asymmetry `k`; reciprocal.
 ///
-/// Cost on GCN: 42 instructions (9 at a quarter of the rate).
+/// Cost on GCN: 45 instructions (9 at a quarter of the rate).
 inline float fuzz_velvet_brdf(
     metal::float3 u,
     metal::float3 v,
@@ -101,7 +101,7 @@ inline float fuzz_velvet_brdf(
 /// BRDF of a layer whose extinction follows the fibres' projected area, as in a true microflake volume:
 /// `D/4 (1 - e^(-d (σ_u/n_u + σ_v/n_v))) / (σ_v n_u + σ_u n_v)`. Reciprocal.
 ///
-/// Cost on GCN: 52 instructions (8 at a quarter of the rate).
+/// Cost on GCN: 54 instructions (8 at a quarter of the rate).
 inline float fuzz_reciprocal_brdf(
     metal::float3 u,
     metal::float3 v,
@@ -122,7 +122,7 @@ inline float fuzz_reciprocal_brdf(
 
 /// Prepares `fuzz_light` for a view at cosine `n_v` ≥ 0 to the normal and `t_v` to the fibres.
 ///
-/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
+/// Cost on GCN: 13 instructions (3 at a quarter of the rate).
 inline FuzzView fuzz_view(
     float n_v,
     float t_v,

@@ -41,7 +41,7 @@ inline float fibre_p_s_step(
 /// of `χ = λ³ + (α² c + 2 k t_u t_n) λ² - (α² + k (1 - t_u² - t_n²)) λ - α² c`, `c = n_u`, `k = 1 - α²`,
 /// `1 - P_s = λ sqrt((λ + c) (λ + α² c/σ²)) / χ'(λ)`. Laguerre's iteration from 1 falls on λ.
 ///
-/// Cost on GCN: 91 instructions (11 at a quarter of the rate).
+/// Cost on GCN: 92 instructions (11 at a quarter of the rate).
 inline float fibre_p_s(
     float n_u,
     float t_u,

@@ -51,7 +51,7 @@ inline float beckmann_aniso_d(
 
 /// Slope towards which a unit normal with z ≥ 0 leans: `n.xy / n.z`, a million at most.
 ///
-/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
 inline metal::float2 slope_from_normal(
     metal::float3 n
 ) {
@@ -311,7 +311,7 @@ inline float fibre_p_s_step(
 /// of `χ = λ³ + (α² c + 2 k t_u t_n) λ² - (α² + k (1 - t_u² - t_n²)) λ - α² c`, `c = n_u`, `k = 1 - α²`,
 /// `1 - P_s = λ sqrt((λ + c) (λ + α² c/σ²)) / χ'(λ)`. Laguerre's iteration from 1 falls on λ.
 ///
-/// Cost on GCN: 91 instructions (11 at a quarter of the rate).
+/// Cost on GCN: 92 instructions (11 at a quarter of the rate).
 inline float fibre_p_s(
     float n_u,
     float t_u,
@@ -506,7 +506,7 @@ constant float FUZZ_COSINE_MIN = 0.000001;
 /// Share of light that passes the layer along a direction at cosine `n_w` ≥ 0 to the normal without meeting a fibre:
 /// `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
 ///
-/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 5 instructions (2 at a quarter of the rate).
 inline float fuzz_passage(
     float density,
     float n_w
@@ -518,7 +518,7 @@ inline float fuzz_passage(
 /// `fuzz_passage` along the light times that along the view, and `phase` the phase function; for cosines ≥ 0. Where both
 /// vanish the BRDF is infinite, and this is its value at FUZZ_COSINE_MIN.
 ///
-/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 6 instructions (1 at a quarter of the rate).
 inline float fuzz_layer(
     float phase,
     float passed,
@@ -532,7 +532,7 @@ inline float fuzz_layer(
 /// `t` fibre direction are unit vectors in a frame with z along the normal. Not reciprocal: `f(u, v) σ(u) = f(v, u)
 /// σ(v)`.
 ///
-/// Cost on GCN: 41 instructions (6 at a quarter of the rate).
+/// Cost on GCN: 44 instructions (6 at a quarter of the rate).
 inline float fuzz_brdf(
     metal::float3 u,
     metal::float3 v,
@@ -550,7 +550,7 @@ inline float fuzz_brdf(
 
 /// `fuzz_brdf` with the velvet phase of asymmetry `k`; reciprocal.
 ///
-/// Cost on GCN: 42 instructions (9 at a quarter of the rate).
+/// Cost on GCN: 45 instructions (9 at a quarter of the rate).
 inline float fuzz_velvet_brdf(
     metal::float3 u,
     metal::float3 v,
@@ -569,7 +569,7 @@ inline float fuzz_velvet_brdf(
 /// BRDF of a layer whose extinction follows the fibres' projected area, as in a true microflake volume:
 /// `D/4 (1 - e^(-d (σ_u/n_u + σ_v/n_v))) / (σ_v n_u + σ_u n_v)`. Reciprocal.
 ///
-/// Cost on GCN: 52 instructions (8 at a quarter of the rate).
+/// Cost on GCN: 54 instructions (8 at a quarter of the rate).
 inline float fuzz_reciprocal_brdf(
     metal::float3 u,
     metal::float3 v,
@@ -590,7 +590,7 @@ inline float fuzz_reciprocal_brdf(
 
 /// Prepares `fuzz_light` for a view at cosine `n_v` ≥ 0 to the normal and `t_v` to the fibres.
 ///
-/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
+/// Cost on GCN: 13 instructions (3 at a quarter of the rate).
 inline FuzzView fuzz_view(
     float n_v,
     float t_v,
@@ -711,7 +711,7 @@ constant float FUZZ_COMBED_ALPHA = 0.3;
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
 /// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002; finite for all n_v in [0, 1].
 ///
-/// Cost on GCN: 15 instructions (4 at a quarter of the rate).
+/// Cost on GCN: 16 instructions (4 at a quarter of the rate).
 inline float fuzz_g(
     float density,
     float n_v
@@ -726,7 +726,7 @@ inline float fuzz_g(
 /// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients; zero where there are
 /// no fibres.
 ///
-/// Cost on GCN: 8 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 inline float fuzz_g_talk(
     Float4Array coefficients,
     float density,
@@ -789,7 +789,7 @@ inline metal::float2 fuzz_ambient_place(
 /// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a
 /// dense one adds to it.
 ///
-/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 inline float fuzz_ambient_tabulated(
     metal::float2 texel,
     float density,
@@ -894,7 +894,7 @@ inline float fuzz_wrap(
 
 /// P_e of the deferred layer, once a pixel.
 ///
-/// Cost on GCN: 3 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
 inline float fuzz_deferred_escape(
     float n_v
 ) {
@@ -916,8 +916,7 @@ inline float fuzz_deferred(
 ) {
     float c = metal::max(n_u + FUZZ_WRAP, 0.0001);
     float wrapped = c * c;
-    float _e11 = fuzz_passage(0.57600003, wrapped);
-    float passed = _e11 * escaped;
+    float passed = metal::exp2(-0.8309924 / wrapped) * escaped;
     float w = 1.000001 + u_v;
     float s = n_u + n_v;
     float m = ((s * s) * 0.055555534) + w;
@@ -993,6 +992,8 @@ inline float ggx_directional_albedo(
 /// counts, towards which facets send most light: `(alpha_t² + alpha_b² + 0.8 (alpha_t² - alpha_b²) (v.y⁴ - v.x⁴)) / 2`.
 /// RMS error of the albedo 0.019 over random pairs in [0.05, 1] and all views, worst 0.32 at a flat view across the pair
 /// (1, 0.05).
+///
+/// Cost on GCN: 10 instructions (1 at a quarter of the rate).
 inline float ggx_albedo_alpha(
     metal::float3 v,
     float alpha_t,
@@ -1010,7 +1011,7 @@ inline float ggx_albedo_alpha(
 /// the view alone, so the compensated lobe is not reciprocal. An anisotropic lobe uses the isotropic albedo at
 /// `ggx_albedo_alpha`.
 ///
-/// Cost on GCN: 38 instructions (3 at a quarter of the rate).
+/// Cost on GCN: 44 instructions (3 at a quarter of the rate).
 inline metal::float3 multiscatter_compensation(
     metal::float3 f0_,
     metal::float3 v,
@@ -1238,6 +1239,8 @@ inline metal::float3 sym2_sqrt(
 }
 
 /// `k A`. Column by column: a matrix times a number, which HLSL writes `mul(k, A)`, is refused by Slang for WGSL.
+///
+/// Cost on GCN: 9 instructions.
 inline metal::float3x3 sym3_scale(
     metal::float3x3 a,
     float k
@@ -1246,6 +1249,8 @@ inline metal::float3x3 sym3_scale(
 }
 
 /// `A + d I`.
+///
+/// Cost on GCN: 3 instructions.
 inline metal::float3x3 sym3_add_diagonal(
     metal::float3x3 a,
     float d

@@ -14,7 +14,7 @@
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
 /// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002; finite for all n_v in [0, 1].
 ///
-/// Cost on GCN: 15 instructions (4 at a quarter of the rate).
+/// Cost on GCN: 16 instructions (4 at a quarter of the rate).
 fn fuzz_g(density: f32, n_v: f32) -> f32 {
     let x = max(n_v, FUZZ_COSINE_MIN);
     let dense = 1.0 - x * log(1.0 + 1.0 / x);
@@ -26,7 +26,7 @@ fn fuzz_g(density: f32, n_v: f32) -> f32 {
 /// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients; zero where there are
 /// no fibres.
 ///
-/// Cost on GCN: 8 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 fn fuzz_g_talk(coefficients: array<f32, 4>, density: f32, n_v: f32) -> f32 {
     let above = 1.0 + n_v * (coefficients[0] + coefficients[1] * n_v);
     return density * above / max(density + n_v * (coefficients[2] + coefficients[3] * n_v * n_v), 1e-20);
@@ -79,7 +79,7 @@ fn fuzz_ambient_place(n_v: f32, t_v: f32, t_n: f32) -> vec2f {
 /// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a
 /// dense one adds to it.
 ///
-/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 fn fuzz_ambient_tabulated(texel: vec2f, density: f32, n_v: f32) -> f32 {
     return texel.x + texel.y * density / max(density + n_v, 1e-20);
 }

@@ -34,7 +34,7 @@ fn fuzz_wrap(n_u: f32) -> f32 {
 
 /// P_e of the deferred layer, once a pixel.
 ///
-/// Cost on GCN: 3 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
 fn fuzz_deferred_escape(n_v: f32) -> f32 {
     return fuzz_passage(FUZZ_DEFERRED_DENSITY, n_v);
 }
@@ -52,7 +52,8 @@ fn fuzz_deferred(n_u: f32, n_v: f32, u_v: f32, escaped: f32) -> f32 {
     // The wrapped cosine over its scale.
     let c = max(n_u + FUZZ_WRAP, 1e-4);
     let wrapped = c * c;
-    let passed = fuzz_passage(FUZZ_DEFERRED_DENSITY / FUZZ_WRAP_SCALE, wrapped) * escaped;
+    // `fuzz_passage`; the cosine is never zero.
+    let passed = exp2(-1.44269504 * (FUZZ_DEFERRED_DENSITY / FUZZ_WRAP_SCALE) / wrapped) * escaped;
 
     // The phase is `(w/m)² / (4π α sqrt(1 - k n_u²))` with half of |u + v|² for w, kept above zero where v = -u.
     let w = 1.000001 + u_v;

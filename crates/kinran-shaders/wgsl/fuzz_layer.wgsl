@@ -14,7 +14,7 @@ const FUZZ_COSINE_MIN: f32 = 1e-6;
 /// Share of light that passes the layer along a direction at cosine `n_w` ≥ 0 to the normal without meeting a fibre:
 /// `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
 ///
-/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 5 instructions (2 at a quarter of the rate).
 fn fuzz_passage(density: f32, n_w: f32) -> f32 {
     return exp2(-1.44269504 * density / max(n_w, FUZZ_COSINE_MIN));
 }
@@ -23,7 +23,7 @@ fn fuzz_passage(density: f32, n_w: f32) -> f32 {
 /// `fuzz_passage` along the light times that along the view, and `phase` the phase function; for cosines ≥ 0. Where both
 /// vanish the BRDF is infinite, and this is its value at FUZZ_COSINE_MIN.
 ///
-/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 6 instructions (1 at a quarter of the rate).
 fn fuzz_layer(phase: f32, passed: f32, n_u: f32, n_v: f32) -> f32 {
     return phase * (1.0 - passed) / max(n_u + n_v, FUZZ_COSINE_MIN);
 }
@@ -32,7 +32,7 @@ fn fuzz_layer(phase: f32, passed: f32, n_u: f32, n_v: f32) -> f32 {
 /// `t` fibre direction are unit vectors in a frame with z along the normal. Not reciprocal: `f(u, v) σ(u) = f(v, u)
 /// σ(v)`.
 ///
-/// Cost on GCN: 41 instructions (6 at a quarter of the rate).
+/// Cost on GCN: 44 instructions (6 at a quarter of the rate).
 fn fuzz_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, alpha: f32) -> f32 {
     let passed = fuzz_passage(density, u.z) * fuzz_passage(density, v.z);
     let value = fuzz_layer(fibre_phase(dot(u, v), dot(t, u), dot(t, v), alpha), passed, u.z, v.z);
@@ -41,7 +41,7 @@ fn fuzz_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, alpha: f32) -> f32 {
 
 /// `fuzz_brdf` with the velvet phase of asymmetry `k`; reciprocal.
 ///
-/// Cost on GCN: 42 instructions (9 at a quarter of the rate).
+/// Cost on GCN: 45 instructions (9 at a quarter of the rate).
 fn fuzz_velvet_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, k: f32) -> f32 {
     let passed = fuzz_passage(density, u.z) * fuzz_passage(density, v.z);
     let value = fuzz_layer(velvet_phase(dot(u, v), dot(t, u), dot(t, v), k), passed, u.z, v.z);
@@ -51,7 +51,7 @@ fn fuzz_velvet_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, k: f32) -> f32 {
 /// BRDF of a layer whose extinction follows the fibres' projected area, as in a true microflake volume:
 /// `D/4 (1 - e^(-d (σ_u/n_u + σ_v/n_v))) / (σ_v n_u + σ_u n_v)`. Reciprocal.
 ///
-/// Cost on GCN: 52 instructions (8 at a quarter of the rate).
+/// Cost on GCN: 54 instructions (8 at a quarter of the rate).
 fn fuzz_reciprocal_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, alpha: f32) -> f32 {
     let h = normalize(u + v);
     let area_u = fibre_projected_area(dot(t, u), alpha);
@@ -89,7 +89,7 @@ struct FuzzLight {
 
 /// Prepares `fuzz_light` for a view at cosine `n_v` ≥ 0 to the normal and `t_v` to the fibres.
 ///
-/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
+/// Cost on GCN: 13 instructions (3 at a quarter of the rate).
 fn fuzz_view(n_v: f32, t_v: f32, density: f32, alpha: f32) -> FuzzView {
     // Over a light's cosine of zero it is infinite and the power zero; a zero would be none over it.
     let exponent = -1.44269504 * max(density, 1e-20);

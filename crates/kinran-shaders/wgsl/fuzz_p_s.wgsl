@@ -24,7 +24,7 @@ fn fibre_p_s_step(l: f32, constant: f32, linear: f32, square: f32) -> f32 {
 /// of `χ = λ³ + (α² c + 2 k t_u t_n) λ² - (α² + k (1 - t_u² - t_n²)) λ - α² c`, `c = n_u`, `k = 1 - α²`,
 /// `1 - P_s = λ sqrt((λ + c) (λ + α² c/σ²)) / χ'(λ)`. Laguerre's iteration from 1 falls on λ.
 ///
-/// Cost on GCN: 91 instructions (11 at a quarter of the rate).
+/// Cost on GCN: 92 instructions (11 at a quarter of the rate).
 fn fibre_p_s(n_u: f32, t_u: f32, t_n: f32, alpha: f32) -> f32 {
     let alpha_sqr = alpha * alpha;
     let k = 1.0 - alpha_sqr;

@@ -39,7 +39,7 @@ fn beckmann_aniso_d(h: vec3f, sigma_t: f32, sigma_b: f32) -> f32 {
 
 /// Slope towards which a unit normal with z ≥ 0 leans: `n.xy / n.z`, a million at most.
 ///
-/// Cost on GCN: 3 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
 fn slope_from_normal(n: vec3f) -> vec2f {
     return n.xy / max(n.z, 1e-6);
 }
@@ -210,7 +210,7 @@ fn fibre_p_s_step(l: f32, constant: f32, linear: f32, square: f32) -> f32 {
 /// of `χ = λ³ + (α² c + 2 k t_u t_n) λ² - (α² + k (1 - t_u² - t_n²)) λ - α² c`, `c = n_u`, `k = 1 - α²`,
 /// `1 - P_s = λ sqrt((λ + c) (λ + α² c/σ²)) / χ'(λ)`. Laguerre's iteration from 1 falls on λ.
 ///
-/// Cost on GCN: 91 instructions (11 at a quarter of the rate).
+/// Cost on GCN: 92 instructions (11 at a quarter of the rate).
 fn fibre_p_s(n_u: f32, t_u: f32, t_n: f32, alpha: f32) -> f32 {
     let alpha_sqr = alpha * alpha;
     let k = 1.0 - alpha_sqr;
@@ -341,7 +341,7 @@ const FUZZ_COSINE_MIN: f32 = 1e-6;
 /// Share of light that passes the layer along a direction at cosine `n_w` ≥ 0 to the normal without meeting a fibre:
 /// `e^(-d / n_w)`. Towards the light it is the talk's `P_p`, towards the viewer `P_e`.
 ///
-/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 5 instructions (2 at a quarter of the rate).
 fn fuzz_passage(density: f32, n_w: f32) -> f32 {
     return exp2(-1.44269504 * density / max(n_w, FUZZ_COSINE_MIN));
 }
@@ -350,7 +350,7 @@ fn fuzz_passage(density: f32, n_w: f32) -> f32 {
 /// `fuzz_passage` along the light times that along the view, and `phase` the phase function; for cosines ≥ 0. Where both
 /// vanish the BRDF is infinite, and this is its value at FUZZ_COSINE_MIN.
 ///
-/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 6 instructions (1 at a quarter of the rate).
 fn fuzz_layer(phase: f32, passed: f32, n_u: f32, n_v: f32) -> f32 {
     return phase * (1.0 - passed) / max(n_u + n_v, FUZZ_COSINE_MIN);
 }
@@ -359,7 +359,7 @@ fn fuzz_layer(phase: f32, passed: f32, n_u: f32, n_v: f32) -> f32 {
 /// `t` fibre direction are unit vectors in a frame with z along the normal. Not reciprocal: `f(u, v) σ(u) = f(v, u)
 /// σ(v)`.
 ///
-/// Cost on GCN: 41 instructions (6 at a quarter of the rate).
+/// Cost on GCN: 44 instructions (6 at a quarter of the rate).
 fn fuzz_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, alpha: f32) -> f32 {
     let passed = fuzz_passage(density, u.z) * fuzz_passage(density, v.z);
     let value = fuzz_layer(fibre_phase(dot(u, v), dot(t, u), dot(t, v), alpha), passed, u.z, v.z);
@@ -368,7 +368,7 @@ fn fuzz_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, alpha: f32) -> f32 {
 
 /// `fuzz_brdf` with the velvet phase of asymmetry `k`; reciprocal.
 ///
-/// Cost on GCN: 42 instructions (9 at a quarter of the rate).
+/// Cost on GCN: 45 instructions (9 at a quarter of the rate).
 fn fuzz_velvet_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, k: f32) -> f32 {
     let passed = fuzz_passage(density, u.z) * fuzz_passage(density, v.z);
     let value = fuzz_layer(velvet_phase(dot(u, v), dot(t, u), dot(t, v), k), passed, u.z, v.z);
@@ -378,7 +378,7 @@ fn fuzz_velvet_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, k: f32) -> f32 {
 /// BRDF of a layer whose extinction follows the fibres' projected area, as in a true microflake volume:
 /// `D/4 (1 - e^(-d (σ_u/n_u + σ_v/n_v))) / (σ_v n_u + σ_u n_v)`. Reciprocal.
 ///
-/// Cost on GCN: 52 instructions (8 at a quarter of the rate).
+/// Cost on GCN: 54 instructions (8 at a quarter of the rate).
 fn fuzz_reciprocal_brdf(u: vec3f, v: vec3f, t: vec3f, density: f32, alpha: f32) -> f32 {
     let h = normalize(u + v);
     let area_u = fibre_projected_area(dot(t, u), alpha);
@@ -416,7 +416,7 @@ struct FuzzLight {
 
 /// Prepares `fuzz_light` for a view at cosine `n_v` ≥ 0 to the normal and `t_v` to the fibres.
 ///
-/// Cost on GCN: 11 instructions (3 at a quarter of the rate).
+/// Cost on GCN: 13 instructions (3 at a quarter of the rate).
 fn fuzz_view(n_v: f32, t_v: f32, density: f32, alpha: f32) -> FuzzView {
     // Over a light's cosine of zero it is infinite and the power zero; a zero would be none over it.
     let exponent = -1.44269504 * max(density, 1e-20);
@@ -478,7 +478,7 @@ fn fuzz_smooth_normal(n: vec3f, vertex_normal: vec3f, smoothness: f32) -> vec3f 
 /// cosine `n_v`: `F (1 - e^-y) (1 - y e^-y / 10)` with `F = 1 - n_v ln(1 + 1/n_v)` and `y = d / (n_v F)`. Within -3.6 %
 /// and +4.8 % of the closed form for densities in [0.002, 3] and n_v ≥ 0.002; finite for all n_v in [0, 1].
 ///
-/// Cost on GCN: 15 instructions (4 at a quarter of the rate).
+/// Cost on GCN: 16 instructions (4 at a quarter of the rate).
 fn fuzz_g(density: f32, n_v: f32) -> f32 {
     let x = max(n_v, FUZZ_COSINE_MIN);
     let dense = 1.0 - x * log(1.0 + 1.0 / x);
@@ -490,7 +490,7 @@ fn fuzz_g(density: f32, n_v: f32) -> f32 {
 /// The talk's form of `fuzz_g`, `d (1 + c_0 x + c_1 x²) / (d + c_2 x + c_3 x³)`, by four coefficients; zero where there are
 /// no fibres.
 ///
-/// Cost on GCN: 8 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 9 instructions (1 at a quarter of the rate).
 fn fuzz_g_talk(coefficients: array<f32, 4>, density: f32, n_v: f32) -> f32 {
     let above = 1.0 + n_v * (coefficients[0] + coefficients[1] * n_v);
     return density * above / max(density + n_v * (coefficients[2] + coefficients[3] * n_v * n_v), 1e-20);
@@ -543,7 +543,7 @@ fn fuzz_ambient_place(n_v: f32, t_v: f32, t_n: f32) -> vec2f {
 /// The factor from what the table holds at `fuzz_ambient_place`, interpolated bilinearly: x for a thin layer, y what a
 /// dense one adds to it.
 ///
-/// Cost on GCN: 4 instructions (1 at a quarter of the rate).
+/// Cost on GCN: 5 instructions (1 at a quarter of the rate).
 fn fuzz_ambient_tabulated(texel: vec2f, density: f32, n_v: f32) -> f32 {
     return texel.x + texel.y * density / max(density + n_v, 1e-20);
 }
@@ -617,7 +617,7 @@ fn fuzz_wrap(n_u: f32) -> f32 {
 
 /// P_e of the deferred layer, once a pixel.
 ///
-/// Cost on GCN: 3 instructions (2 at a quarter of the rate).
+/// Cost on GCN: 4 instructions (2 at a quarter of the rate).
 fn fuzz_deferred_escape(n_v: f32) -> f32 {
     return fuzz_passage(FUZZ_DEFERRED_DENSITY, n_v);
 }
@@ -635,7 +635,8 @@ fn fuzz_deferred(n_u: f32, n_v: f32, u_v: f32, escaped: f32) -> f32 {
     // The wrapped cosine over its scale.
     let c = max(n_u + FUZZ_WRAP, 1e-4);
     let wrapped = c * c;
-    let passed = fuzz_passage(FUZZ_DEFERRED_DENSITY / FUZZ_WRAP_SCALE, wrapped) * escaped;
+    // `fuzz_passage`; the cosine is never zero.
+    let passed = exp2(-1.44269504 * (FUZZ_DEFERRED_DENSITY / FUZZ_WRAP_SCALE) / wrapped) * escaped;
 
     // The phase is `(w/m)² / (4π α sqrt(1 - k n_u²))` with half of |u + v|² for w, kept above zero where v = -u.
     let w = 1.000001 + u_v;
@@ -701,6 +702,8 @@ fn ggx_directional_albedo(n_v: f32, alpha: f32) -> f32 {
 /// counts, towards which facets send most light: `(alpha_t² + alpha_b² + 0.8 (alpha_t² - alpha_b²) (v.y⁴ - v.x⁴)) / 2`.
 /// RMS error of the albedo 0.019 over random pairs in [0.05, 1] and all views, worst 0.32 at a flat view across the pair
 /// (1, 0.05).
+///
+/// Cost on GCN: 10 instructions (1 at a quarter of the rate).
 fn ggx_albedo_alpha(v: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
     let t = alpha_t * alpha_t;
     let b = alpha_b * alpha_b;
@@ -714,7 +717,7 @@ fn ggx_albedo_alpha(v: vec3f, alpha_t: f32, alpha_b: f32) -> f32 {
 /// the view alone, so the compensated lobe is not reciprocal. An anisotropic lobe uses the isotropic albedo at
 /// `ggx_albedo_alpha`.
 ///
-/// Cost on GCN: 38 instructions (3 at a quarter of the rate).
+/// Cost on GCN: 44 instructions (3 at a quarter of the rate).
 fn multiscatter_compensation(f0: vec3f, v: vec3f, alpha_t: f32, alpha_b: f32) -> vec3f {
     let e = ggx_directional_albedo(saturate(v.z), ggx_albedo_alpha(v, alpha_t, alpha_b));
     return 1.0 + f0 * (1.0 / e - 1.0);
@@ -894,11 +897,15 @@ fn sym2_sqrt(a: vec3f) -> vec3f {
 }
 
 /// `k A`. Column by column: a matrix times a number, which HLSL writes `mul(k, A)`, is refused by Slang for WGSL.
+///
+/// Cost on GCN: 9 instructions.
 fn sym3_scale(a: mat3x3f, k: f32) -> mat3x3f {
     return mat3x3f(a[0] * k, a[1] * k, a[2] * k);
 }
 
 /// `A + d I`.
+///
+/// Cost on GCN: 3 instructions.
 fn sym3_add_diagonal(a: mat3x3f, d: f32) -> mat3x3f {
     return mat3x3f(a[0] + vec3f(d, 0.0, 0.0), a[1] + vec3f(0.0, d, 0.0), a[2] + vec3f(0.0, 0.0, d));
 }

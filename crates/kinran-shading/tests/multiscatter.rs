@@ -117,7 +117,7 @@ fn the_worst_error_of_anisotropic_compensation_is_not_the_stated_one() {
 fn compensation_leaves_black_facets_black_and_never_darkens() {
     for n_v in [0.0, 0.01, 0.5, 1.0] {
         for alphas in [(0.004, 0.004), (1.0, 0.004), (1.0, 1.0)] {
-            let v = view(n_v.into(), 1.0).as_vec3();
+            let v = view(n_v, 1.0).as_vec3();
             let factor = multiscatter_compensation(Vec3::new(0.0, 0.5, 1.0), v, alphas.0, alphas.1);
             assert_eq!(factor.x, 1.0, "f0 = 0 at n·v {n_v}, alphas {alphas:?}");
             assert!(

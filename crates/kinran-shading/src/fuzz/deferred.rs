@@ -1,7 +1,7 @@
 //! Fuzz by seven bits of a G-buffer: fixed fibres over Lambert, for moss and felt (slide: Deferred).
 
 use crate::{fuzz::layer::fuzz_passage, sqrt::sqrt};
-use core::f32::consts::PI;
+use core::f32::consts::{LOG2_E, PI};
 use glam::Vec3;
 
 /// Density of the layer.
@@ -46,7 +46,8 @@ pub fn fuzz_deferred(n_u: f32, n_v: f32, u_v: f32, escaped: f32) -> f32 {
     // The wrapped cosine over its scale.
     let c = (n_u + FUZZ_WRAP).max(1e-4);
     let wrapped = c * c;
-    let passed = fuzz_passage(FUZZ_DEFERRED_DENSITY / FUZZ_WRAP_SCALE, wrapped) * escaped;
+    // `fuzz_passage`; the cosine is never zero.
+    let passed = libm::exp2f(-LOG2_E * (FUZZ_DEFERRED_DENSITY / FUZZ_WRAP_SCALE) / wrapped) * escaped;
 
     // The phase is `(w/m)² / (4π α sqrt(1 - k n_u²))` with half of |u + v|² for w, kept above zero where v = -u.
     let w = 1.000_001 + u_v;
