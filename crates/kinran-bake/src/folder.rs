@@ -299,6 +299,8 @@ pub struct MaterialMaps {
     pub files: Vec<(Role, PathBuf)>,
     /// What lies beyond the borders.
     pub wrap: [Wrap; 2],
+    /// What was assumed that matters and that a flag settles, a sentence each.
+    pub warnings: Vec<String>,
 }
 
 impl Folder {
@@ -372,10 +374,20 @@ pub fn scan(folder: &Path, hints: &Hints) -> Result<Folder, FolderError> {
             "" => folder_name(folder),
             stem => stem.to_owned(),
         };
-        let material = understand(&name, &mut files, hints)?;
-        let constant = material.as_ref().and_then(constant_row);
+        let mut material = understand(&name, &mut files, hints)?;
+        let constants = material.as_ref().map(|material| constant_rows(material, hints)).unwrap_or_default();
+        if let Some(material) = material.as_mut().filter(|m| lacks_roughness(m) && hints.roughness.is_none())
+        {
+            let seen: Vec<String> = strangers.iter().map(|file| file.file.clone()).collect();
+            let seen =
+                if seen.is_empty() { seen.concat() } else { format!("; not recognised: {}", listed(&seen)) };
+            material.warnings.push(format!(
+                "{name}: no roughness map, {ASSUMED_ROUGHNESS} is assumed; say --roughness VALUE, or name the map with \
+                 --map roughness=FILE{seen}"
+            ));
+        }
         result.rows.extend(files.into_iter().map(|file| row_of(&name, file)));
-        result.rows.extend(constant);
+        result.rows.extend(constants);
         result.materials.extend(material);
     }
     result.rows.extend(strangers.into_iter().map(|file| row_of("", file)));
@@ -572,22 +584,57 @@ fn row_of(material: &str, file: Found) -> Row {
     Row { material: material.into(), file: file.file, role: file.role, channels: channels.into(), note }
 }
 
-/// The row of a roughness that no file gives.
-fn constant_row(material: &MaterialMaps) -> Option<Row> {
-    let base = match material.roughness.as_ref()? {
-        RoughnessSource::Isotropic(base)
-        | RoughnessSource::Level { base, .. }
-        | RoughnessSource::Khr { base, .. } => base,
-        _ => return None,
-    };
-    let BaseRoughness::Constant(value) = base else { return None };
-    Some(Row {
+/// Whether a material has a roughness that no file gives.
+fn lacks_roughness(material: &MaterialMaps) -> bool {
+    match &material.roughness {
+        // Its occlusion and metalness are packed with one.
+        None => material.occlusion.is_some() || material.metallic.is_some(),
+        Some(
+            RoughnessSource::Isotropic(base)
+            | RoughnessSource::Level { base, .. }
+            | RoughnessSource::Khr { base, .. },
+        ) => matches!(base, BaseRoughness::Constant(_)),
+        Some(RoughnessSource::GlossUv { .. } | RoughnessSource::Encoded(_)) => false,
+    }
+}
+
+/// Rows of what no file gives.
+fn constant_rows(material: &MaterialMaps, hints: &Hints) -> Vec<Row> {
+    let row = |role: Role, note: String| Row {
         material: material.name.clone(),
         file: "-".into(),
-        role: Some(Role::Roughness),
+        role: Some(role),
         channels: "-".into(),
-        note: format!("no map: {value} everywhere; --roughness VALUE sets it"),
-    })
+        note,
+    };
+    let mut rows = Vec::new();
+    if lacks_roughness(material) {
+        rows.push(row(
+            Role::Roughness,
+            match hints.roughness {
+                Some(value) => format!("no map: {value} everywhere, by --roughness"),
+                None => format!(
+                    "warning: no map, {ASSUMED_ROUGHNESS} is assumed everywhere; --roughness VALUE sets it"
+                ),
+            },
+        ));
+    }
+    let along_tangent = matches!(
+        &material.roughness,
+        Some(
+            RoughnessSource::GlossUv { direction: None, .. } | RoughnessSource::Level { direction: None, .. }
+        )
+    );
+    if along_tangent {
+        rows.push(row(Role::Direction, "no map: along the tangent".into()));
+    }
+    if material.occlusion.is_some() && material.metallic.is_none() {
+        rows.push(row(Role::Metallic, "no map: 0 everywhere, no metal".into()));
+    }
+    if material.metallic.is_some() && material.occlusion.is_none() {
+        rows.push(row(Role::Occlusion, "no map: 1 everywhere".into()));
+    }
+    rows
 }
 
 /// Makes a material of the files of one stem; none if nothing of them is used.
@@ -806,6 +853,7 @@ fn understand(
         metallic,
         files: used,
         wrap: hints.wrap,
+        warnings: Vec::new(),
     }))
 }
 

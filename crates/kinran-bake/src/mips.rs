@@ -378,15 +378,16 @@ pub fn plain_levels(
         .collect()
 }
 
-/// One 8-bit image out of channels of others, enlarged to `size` bilinearly where they are smaller; 255 where
-/// there is none.
+/// One 8-bit image out of channels of others, enlarged to `size` bilinearly where they are smaller; `otherwise`
+/// where there is none.
 pub fn pack_channels(
     channels: [Option<(&Image, usize)>; 4],
+    otherwise: [u8; 4],
     size: (u32, u32),
     wrap: [Wrap; 2],
 ) -> Result<Image, Error> {
     let width = size.0 as usize;
-    let mut bytes = vec![255; width * size.1 as usize * 4];
+    let mut bytes = otherwise.repeat(width * size.1 as usize);
     bytes.par_chunks_mut(width * 4).enumerate().for_each(|(y, row)| {
         let at = Place { size, y: y as u32, x0: 0, wrap };
         let mut plane = vec![0.0; width];

@@ -337,6 +337,41 @@ fn hidden_files_and_folders_called_like_maps_are_passed_over() {
     assert!(folder.rows[1].note.contains("--roughness"), "{}", folder.table());
 }
 
+/// What a material's warnings and the constants of its table say.
+fn assumed(names: &[&str], hints: &Hints) -> (Vec<String>, Vec<String>) {
+    let dir = folder_of(names);
+    let folder = scan(dir.path(), hints).unwrap();
+    let rows = folder.rows.iter().filter(|row| row.file == "-");
+    let rows = rows.map(|row| format!("{}: {}", row.role.unwrap(), row.note)).collect();
+    (folder.materials[0].warnings.clone(), rows)
+}
+
+#[test]
+fn a_roughness_that_nobody_gave_is_assumed_in_silence() {
+    let plain = Hints::default();
+    let said = Hints { roughness: Some(0.3), ..Hints::default() };
+    // The kinds of surface that need a roughness, and a packed map that does.
+    for names in
+        [&["a_normal.png"][..], &["a_normal.png", "a_AnisotropyLevel.png"], &["a_ao.png", "a_color.png"]]
+    {
+        let (warnings, rows) = assumed(names, &plain);
+        assert_eq!(warnings.len(), 1, "{names:?}: {warnings:?}");
+        assert!(warnings[0].starts_with("a: no roughness map, 0.5 is assumed"), "{warnings:?}");
+        assert!(rows[0].starts_with("roughness: warning: no map, 0.5 is assumed"), "{rows:?}");
+        let (warnings, rows) = assumed(names, &said);
+        assert!(warnings.is_empty(), "{names:?}: {warnings:?}");
+        assert_eq!(rows[0], "roughness: no map: 0.3 everywhere, by --roughness");
+    }
+    for names in [&["a_normal.png", "a_rough.png"][..], &["a_normal.png", "a_orm.png"], &["a_color.png"]] {
+        let (warnings, rows) = assumed(names, &plain);
+        assert!(warnings.is_empty() && rows.is_empty(), "{names:?}: {warnings:?} {rows:?}");
+    }
+    let (warnings, _) = assumed(&["a_normal.png", "a_blob.png"], &plain);
+    assert!(warnings[0].contains("not recognised: a_blob.png"), "{warnings:?}");
+    let (_, rows) = assumed(&["a_rough.png", "a_ao.png"], &plain);
+    assert_eq!(rows, ["metallic: no map: 0 everywhere, no metal"]);
+}
+
 // Questions
 
 #[test]
@@ -560,13 +595,13 @@ fn flat_and_tiny_maps_do_not_tell_green() {
 #[test]
 fn an_unlabelled_map_that_looks_like_directx_is_asked_about_a_labelled_one_only_noted() {
     let (up, down) = (waves(Green::Up), waves(Green::Down));
-    let plain = Hints::default();
+    let plain = Hints { roughness: Some(0.5), ..Hints::default() };
     let error = load_one(&[("x_normal.png", &down)], &plain).unwrap_err().to_string();
     for wanted in ["x_normal.png", "--y-down", "--y-up"] {
         assert!(error.contains(wanted), "{error}");
     }
     for green in [Green::Up, Green::Down] {
-        let flag = Hints { green: Some(green), ..Hints::default() };
+        let flag = Hints { green: Some(green), ..plain.clone() };
         let loaded = load_one(&[("x_normal.png", &down)], &flag).unwrap();
         assert_eq!(loaded.surface.unwrap().normal.y_down, green == Green::Down);
         assert_eq!(loaded.notes.len(), usize::from(green == Green::Up), "{:?}", loaded.notes);
@@ -575,7 +610,7 @@ fn an_unlabelled_map_that_looks_like_directx_is_asked_about_a_labelled_one_only_
     assert!(!loaded.surface.unwrap().normal.y_down);
     assert!(loaded.notes[0].contains("though its slopes look like -Y"), "{:?}", loaded.notes);
     let loaded = load_one(&[("x_normal.png", &up)], &plain).unwrap();
-    assert!(loaded.notes[0].contains("assumed +Y, and its slopes agree"), "{:?}", loaded.notes);
+    assert!(!loaded.notes.iter().any(|note| note.contains("+Y")), "nothing is open: {:?}", loaded.notes);
 }
 
 #[test]
@@ -603,7 +638,8 @@ fn float_maps_with_negative_components_are_normals_too() {
     assert!((green_correlation(&image) - green_correlation(&eight)).abs() < 1e-4);
     let dir = tempfile::tempdir().unwrap();
     kinran_image::write_exr(&dir.path().join("x_nor_gl.exr"), &image).unwrap();
-    let loaded = scan(dir.path(), &Hints::default()).unwrap().materials[0].load().unwrap();
+    let hints = Hints { roughness: Some(0.5), ..Hints::default() };
+    let loaded = scan(dir.path(), &hints).unwrap().materials[0].load().unwrap();
     assert!(loaded.surface.unwrap().normal.signed);
     assert_eq!(loaded.notes, [""; 0]);
 }
@@ -879,6 +915,7 @@ fn sample_assets_of_another_kind_pass_for_normals() {
                 metallic: None,
                 files: vec![(Role::Normal, wrong.clone())],
                 wrap: Hints::default().wrap,
+                warnings: Vec::new(),
             };
             let error = material.load().map(|_| ()).expect_err(&wrong.display().to_string()).to_string();
             assert!(error.contains("--force-normal"), "{error}");

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use base64::Engine;
 use percent_encoding::percent_decode_str;
@@ -114,8 +114,9 @@ pub(crate) enum Target<'a> {
     File(Cow<'a, str>),
 }
 
-/// Understands a `data:` URI or a relative path (glTF 2.0 section 2.8). Absolute paths and other schemes
-/// are refused: a document must not make its reader open arbitrary files or connections.
+/// Understands a `data:` URI or a relative path (glTF 2.0 section 2.8). Absolute paths, drives and other schemes
+/// are refused: a document must not make its reader open arbitrary files or connections. A backslash separates
+/// folders as `/` does, as in browsers and on Windows. Whether `..` leads too far is [`beside`]'s question.
 pub(crate) fn parse_uri(uri: &str) -> Result<Target<'_>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (header, payload) = data.split_once(',').ok_or("a data: URI has no comma")?;
@@ -138,19 +139,93 @@ pub(crate) fn parse_uri(uri: &str) -> Result<Target<'_>, String> {
     let path = percent_decode_str(uri)
         .decode_utf8()
         .map_err(|_| format!("the URI \"{shown}\" is not UTF-8 once percent-decoded"))?;
-    if path.is_empty() || path.starts_with(['/', '\\']) || path.contains('\0') {
+    let path = if path.contains('\\') { Cow::Owned(path.replace('\\', "/")) } else { path };
+    let drive = path.as_bytes().first().is_some_and(u8::is_ascii_alphabetic) && path[1..].starts_with(':');
+    if path.is_empty() || path.starts_with('/') || drive || path.contains('\0') {
         return Err(format!("the URI \"{shown}\" is not a relative path; put the file beside the document"));
     }
     Ok(Target::File(path))
 }
 
-/// The bytes behind a relative path, as [`parse_uri`] gives it.
-pub(crate) type Resolver<'a> = dyn Fn(&str) -> io::Result<Vec<u8>> + Sync + 'a;
+/// Why the bytes behind a relative path are not given.
+pub(crate) enum Refusal {
+    /// The file cannot be read.
+    Io(io::Error),
+    /// It lies in `folder`, which is neither the document's own nor allowed.
+    Outside { folder: PathBuf },
+}
 
-/// A resolver that reads files beside `document`.
-pub(crate) fn beside(document: &Path) -> impl Fn(&str) -> io::Result<Vec<u8>> + Sync + use<> {
-    let folder = document.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-    move |path| read_regular_file(&folder.join(path))
+/// The bytes behind a relative path, as [`parse_uri`] gives it.
+pub(crate) type Resolver<'a> = dyn Fn(&str) -> Result<Vec<u8>, Refusal> + Sync + 'a;
+
+/// As [`Resolver`], of a caller who has files elsewhere than on a disk.
+pub(crate) type GivenResolver<'a> = dyn Fn(&str) -> io::Result<Vec<u8>> + Sync + 'a;
+
+/// A caller's resolver, which is never asked for a path that leaves the document's folder.
+pub(crate) fn given<'a>(
+    resolve: &'a GivenResolver<'a>,
+) -> impl Fn(&str) -> Result<Vec<u8>, Refusal> + Sync + 'a {
+    |path| {
+        let plain = plain(Path::new(path));
+        if plain.starts_with("..") {
+            return Err(Refusal::Outside { folder: plain.parent().unwrap_or(&plain).to_path_buf() });
+        }
+        resolve(path).map_err(Refusal::Io)
+    }
+}
+
+/// A resolver that reads the files of the folder of `document`, of folders in it, and of `allowed` folders. A link
+/// counts for where it leads.
+pub(crate) fn beside<'a>(
+    document: &Path,
+    allowed: &'a [PathBuf],
+) -> impl Fn(&str) -> Result<Vec<u8>, Refusal> + Sync + use<'a> {
+    let folder = folder_of(document);
+    move |path| read_regular_file(&locate(&folder, allowed, path)?).map_err(Refusal::Io)
+}
+
+/// Where a file of a document in `folder` really lies, if that is a place for it.
+pub(crate) fn locate(folder: &Path, allowed: &[PathBuf], path: &str) -> Result<PathBuf, Refusal> {
+    let file = folder.join(path);
+    let outside = |file: &Path| Refusal::Outside { folder: plain(file.parent().unwrap_or(file)) };
+    let within = |file: &Path, place: &dyn Fn(&Path) -> io::Result<PathBuf>| {
+        let folders = std::iter::once(folder).chain(allowed.iter().map(PathBuf::as_path));
+        folders.filter_map(|folder| place(folder).ok()).any(|folder| file.starts_with(folder))
+    };
+    let real = match file.canonicalize() {
+        Ok(real) => real,
+        // Whether there is such a file elsewhere is nothing that a document may find out.
+        Err(error) => {
+            let absolute = |path: &Path| Ok(plain(&std::path::absolute(path)?));
+            let lexical = absolute(&file).map_err(Refusal::Io)?;
+            return Err(if within(&lexical, &absolute) { Refusal::Io(error) } else { outside(&file) });
+        }
+    };
+    if !within(&real, &Path::canonicalize) {
+        let leaves = plain(Path::new(path)).starts_with("..");
+        return Err(outside(if leaves { &file } else { &real }));
+    }
+    Ok(real)
+}
+
+/// The folder of a file; the current one where its name is all there is.
+pub(crate) fn folder_of(file: &Path) -> PathBuf {
+    file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_path_buf()
+}
+
+/// A path without `.`, and without `..` but in front.
+fn plain(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir if matches!(plain.components().next_back(), Some(Component::Normal(_))) => {
+                plain.pop();
+            }
+            other => plain.push(other),
+        }
+    }
+    if plain.as_os_str().is_empty() { PathBuf::from(".") } else { plain }
 }
 
 /// All bytes of a file; devices, pipes and folders are refused, since reading them may never end.
@@ -165,12 +240,119 @@ pub(crate) fn read_regular_file(path: &Path) -> io::Result<Vec<u8>> {
     std::fs::read(path)
 }
 
+/// What a document names a file for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    Buffer,
+    Image,
+}
+
+/// Extensions of buffers: those that `application/gltf-buffer` is registered with.
+const BUFFER_EXTENSIONS: [&str; 3] = ["bin", "glbin", "glbuf"];
+
+/// Extensions of images: glTF's two, those of its extensions, and what `kinran_image` reads besides.
+const IMAGE_EXTENSIONS: [&str; 18] = [
+    "png", "jpg", "jpeg", "jpe", "jfif", "ktx2", "dds", "webp", "avif", "basis", "ktx", "bmp", "gif", "tga",
+    "tif", "tiff", "exr", "hdr",
+];
+
+impl Purpose {
+    /// Refuses a file that cannot be what it is named for. Its name must say it, so that no document gets a key or a
+    /// password written into what is made of it; an image may say it by its first bytes.
+    fn check(self, path: &str, bytes: &[u8]) -> Result<(), String> {
+        let is = |extensions: &[&str]| {
+            let own = Path::new(path).extension();
+            own.is_some_and(|own| extensions.iter().any(|e| own.eq_ignore_ascii_case(e)))
+        };
+        match self {
+            Purpose::Buffer if !is(&BUFFER_EXTENSIONS) => Err(format!(
+                "the file \"{path}\" is no buffer by its name; buffers end in .{}",
+                BUFFER_EXTENSIONS.join(", .")
+            )),
+            Purpose::Image if !is(&IMAGE_EXTENSIONS) && !is_image(bytes) => Err(format!(
+                "the file \"{path}\" is no image, neither by its name nor by its first bytes; name a PNG or JPEG"
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether bytes begin as PNG, JPEG, KTX2 or DDS do.
+fn is_image(bytes: &[u8]) -> bool {
+    let magic: [&[u8]; 4] = [b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\xabKTX 20\xbb", b"DDS "];
+    magic.iter().any(|magic| bytes.starts_with(magic))
+}
+
 /// The bytes a URI points at; `what` names its place in the document.
-pub(crate) fn fetch(name: &Path, what: &str, uri: &str, resolve: &Resolver<'_>) -> Result<Vec<u8>, Error> {
-    match parse_uri(uri).map_err(|reason| Error::malformed(name, format!("{what}: {reason}")))? {
+pub(crate) fn fetch(
+    name: &Path,
+    what: &str,
+    purpose: Purpose,
+    uri: &str,
+    resolve: &Resolver<'_>,
+) -> Result<Vec<u8>, Error> {
+    let malformed = |reason: String| Error::malformed(name, format!("{what}: {reason}"));
+    match parse_uri(uri).map_err(malformed)? {
         Target::Data(bytes) => Ok(bytes),
-        Target::File(path) => resolve(&path).map_err(|error| {
-            Error::malformed(name, format!("{what}: the file \"{path}\" it names cannot be read: {error}"))
-        }),
+        Target::File(path) => match resolve(&path) {
+            Ok(bytes) => purpose.check(&path, &bytes).map(|()| bytes).map_err(malformed),
+            Err(Refusal::Io(error)) => {
+                Err(malformed(format!("the file \"{path}\" it names cannot be read: {error}")))
+            }
+            Err(Refusal::Outside { folder }) => Err(Error::Outside {
+                path: name.to_path_buf(),
+                what: what.into(),
+                file: path.into_owned(),
+                folder,
+            }),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Target, parse_uri, plain};
+
+    #[test]
+    fn uris_that_are_not_relative_are_taken() {
+        for refused in [
+            "/etc/passwd",
+            "%2Fetc/passwd",
+            "\\\\server\\share\\a.png",
+            "%5C%5Cserver/a.png",
+            "file:///etc/passwd",
+            "FILE:a.png",
+            "http://localhost/a.png",
+            "C:\\a.png",
+            "C:a.png",
+            "C%3A%5Ca.png",
+            "c%3Aa.png",
+            "a%00.png",
+            "",
+        ] {
+            assert!(parse_uri(refused).is_err(), "{refused:?} was taken");
+        }
+        let decoded = |uri| match parse_uri(uri) {
+            Ok(Target::File(path)) => path.into_owned(),
+            Ok(Target::Data(_)) => panic!("{uri} is a file"),
+            Err(e) => panic!("{uri}: {e}"),
+        };
+        assert_eq!(decoded("textures\\a%20b.png"), "textures/a b.png");
+        assert_eq!(decoded("%2e%2e%5Ca.png"), "../a.png", "what is hidden by an encoding");
+        assert_eq!(decoded("ü.png"), "ü.png");
+    }
+
+    #[test]
+    fn dots_hide_where_a_path_leads() {
+        for (path, wanted) in [
+            ("a/../b.png", "b.png"),
+            ("a/../../b.png", "../b.png"),
+            ("./a/./b", "a/b"),
+            ("../../a/..", "../.."),
+            ("a/..", "."),
+            ("/../a", "/../a"),
+        ] {
+            assert_eq!(plain(path.as_ref()), std::path::Path::new(wanted), "{path}");
+        }
     }
 }

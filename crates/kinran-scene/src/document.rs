@@ -11,7 +11,9 @@ use percent_encoding::{AsciiSet, CONTROLS, percent_encode};
 use serde_json::{Map, Value, json};
 
 use crate::Error;
-use crate::container::{Target, join, parse_uri, read_regular_file, split};
+use crate::container::{
+    Purpose, Refusal, Target, beside, fetch, folder_of, join, locate, parse_uri, read_regular_file, split,
+};
 
 pub use mesh::Attribute;
 
@@ -124,6 +126,8 @@ const PATH: &AsciiSet = &CONTROLS
 #[derive(Clone, Debug)]
 pub struct Document {
     path: PathBuf,
+    /// Folders whose files it may name besides those of its own.
+    allowed: Vec<PathBuf>,
     json: Object,
     /// The GLB's binary chunk.
     bin: Option<Vec<u8>>,
@@ -143,9 +147,17 @@ impl Document {
     /// One that names the file: missing, truncated, no glTF 2.0, or not shaped as glTF where textures and
     /// buffers are concerned.
     pub fn open(path: impl AsRef<Path>) -> Result<Document, Error> {
+        Document::open_allowing(path, &[])
+    }
+
+    /// As [`Document::open`]; the document may also name files of these folders.
+    ///
+    /// # Errors
+    /// As [`Document::open`].
+    pub fn open_allowing(path: impl AsRef<Path>, allowed: &[PathBuf]) -> Result<Document, Error> {
         let path = path.as_ref();
         let bytes = read_regular_file(path).map_err(|error| Error::io(path, error))?;
-        Document::from_bytes(path, &bytes)
+        Ok(Document { allowed: allowed.to_vec(), ..Document::from_bytes(path, &bytes)? })
     }
 
     /// As [`Document::open`], from the bytes of the file `path`, which need not exist as long as nothing
@@ -162,6 +174,7 @@ impl Document {
         let original_images = used_images(&mut json);
         Ok(Document {
             path: path.to_path_buf(),
+            allowed: Vec::new(),
             json,
             bin: container.bin.map(<[u8]>::to_vec),
             original_textures,
@@ -176,18 +189,30 @@ impl Document {
         &self.path
     }
 
-    /// The files that buffers and images are in, each once, as paths that begin with the document's folder.
+    /// The files that buffers and images are in, each once, as paths that begin with the document's folder; also those
+    /// that it may not name, and none that is a device, a pipe or a folder.
     pub fn files(&self) -> Vec<PathBuf> {
-        let folder = self.path.parent().unwrap_or(Path::new(""));
-        let entries = array(&self.json, "buffers").iter().chain(array(&self.json, "images"));
-        let uris = entries.filter_map(|entry| entry.get("uri")?.as_str());
-        let files: BTreeSet<PathBuf> = uris
-            .filter_map(|uri| match parse_uri(uri) {
-                Ok(Target::File(path)) => Some(folder.join(&*path)),
-                _ => None,
-            })
-            .collect();
-        files.into_iter().collect()
+        let files: BTreeSet<PathBuf> = self.own_files().into_iter().collect();
+        files.into_iter().filter(|file| file.is_file() || !file.exists()).collect()
+    }
+
+    /// Refuses a document that names a file outside of its own folder and of those that are allowed; none is read.
+    ///
+    /// # Errors
+    /// [`Error::Outside`].
+    pub fn check_files(&self) -> Result<(), Error> {
+        for (list, what) in [("buffers", "buffer"), ("images", "image")] {
+            for (i, entry) in array(&self.json, list).iter().enumerate() {
+                let uri = entry.get("uri").and_then(Value::as_str).unwrap_or("");
+                let Ok(Target::File(file)) = parse_uri(uri) else { continue };
+                let located = locate(&folder_of(&self.path), &self.allowed, &file);
+                if let Err(Refusal::Outside { folder }) = located {
+                    let (path, what) = (self.path.clone(), format!("{what} {i}"));
+                    return Err(Error::Outside { path, what, file: file.into_owned(), folder });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The whole document's JSON.
@@ -265,7 +290,7 @@ impl Document {
             .get(image)
             .ok_or_else(|| Error::malformed(&self.path, format!("{what} does not exist")))?;
         if let Some(uri) = entry.get("uri").and_then(Value::as_str) {
-            return self.fetch(uri, &what).map(Cow::Owned);
+            return self.fetch(uri, &what, Purpose::Image).map(Cow::Owned);
         }
         let view = entry
             .get("bufferView")
@@ -420,6 +445,16 @@ impl Document {
     /// When a file cannot be read or written, when `path` has another extension, or when it or a copy would
     /// overwrite a file that the document was read from.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<Vec<String>, Error> {
+        let packed = self.pack(path)?;
+        packed.write()?;
+        Ok(packed.warnings)
+    }
+
+    /// What [`Document::write`] writes; nothing is written yet.
+    ///
+    /// # Errors
+    /// As [`Document::write`], but for what cannot be written.
+    pub fn pack(&self, path: impl AsRef<Path>) -> Result<Packed, Error> {
         let path = path.as_ref();
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         let glb = match extension.as_deref() {
@@ -442,19 +477,14 @@ impl Document {
         let bin = self.place_buffers(path, glb, &dropped_views, &mut output)?;
         self.place_images(path, &mut output)?;
 
-        for (file, bytes) in &output.files {
-            if let Some(folder) = file.parent() {
-                std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
-            }
-            write_atomically(file, bytes)?;
-        }
         let encoded =
             if glb { serde_json::to_vec(&output.json) } else { serde_json::to_vec_pretty(&output.json) };
         let encoded = encoded
             .map_err(|error| Error::malformed(path, format!("the JSON cannot be written: {error}")))?;
         let bytes = if glb { join(path, &encoded, &bin)? } else { encoded };
-        write_atomically(path, &bytes)?;
-        Ok(output.warnings)
+        let mut files: Vec<(PathBuf, Vec<u8>)> = output.files.into_iter().collect();
+        files.push((path.to_path_buf(), bytes));
+        Ok(Packed { files, warnings: output.warnings })
     }
 
     /// Drops what nothing refers to any more; gives the byte ranges, by buffer, that only dropped images
@@ -543,7 +573,8 @@ impl Document {
             let data_uri = uri.as_ref().is_some_and(|uri| uri.starts_with("data:"));
             if cuts.is_empty() && !into_chunk && !in_bin {
                 if let (Some(uri), false) = (&uri, data_uri) {
-                    let copied = self.copy(uri, &format!("buffer {buffer}"), path, output)?;
+                    let copied =
+                        self.copy(uri, &format!("buffer {buffer}"), Purpose::Buffer, path, output)?;
                     entry_mut(&mut output.json, "buffers", buffer).insert("uri".into(), copied.into());
                 }
                 continue;
@@ -649,7 +680,7 @@ impl Document {
             let Some(uri) = uri.filter(|uri| !uri.starts_with("data:") && !added.contains(uri)) else {
                 continue;
             };
-            let copied = self.copy(&uri, &format!("image {image}"), path, output)?;
+            let copied = self.copy(&uri, &format!("image {image}"), Purpose::Image, path, output)?;
             entry_mut(&mut output.json, "images", image).insert("uri".into(), copied.into());
         }
         Ok(())
@@ -657,7 +688,14 @@ impl Document {
 
     /// Plans the copy of a file that the document names; gives its new URI. Paths that leave the document's
     /// folder lose their folders.
-    fn copy(&self, uri: &str, what: &str, path: &Path, output: &mut Output) -> Result<String, Error> {
+    fn copy(
+        &self,
+        uri: &str,
+        what: &str,
+        purpose: Purpose,
+        path: &Path,
+        output: &mut Output,
+    ) -> Result<String, Error> {
         let relative = match parse_uri(uri) {
             Ok(Target::File(relative)) => relative.into_owned(),
             // Without the file there is nothing to copy; the reference stays as it is.
@@ -670,14 +708,15 @@ impl Document {
             return Ok(uri.to_owned());
         }
         let (target, uri) = if inside {
-            (folder.join(&relative), uri.to_owned())
+            let backslash = uri.contains('\\') || uri.to_ascii_lowercase().contains("%5c");
+            (folder.join(&relative), if backslash { uri_of(&relative) } else { uri.to_owned() })
         } else {
             let name = Path::new(&relative).file_name().and_then(|name| name.to_str()).ok_or_else(|| {
                 Error::malformed(&self.path, format!("{what}: the URI \"{uri}\" does not name a file"))
             })?;
             (folder.join(name), percent_encode(name.as_bytes(), PATH).to_string())
         };
-        let bytes = self.fetch(&uri_of(&relative), what)?;
+        let bytes = self.fetch(&uri_of(&relative), what, purpose)?;
         self.emit(target, bytes, output)?;
         Ok(uri)
     }
@@ -724,7 +763,7 @@ impl Document {
             return Ok(Cow::Borrowed(bytes));
         }
         let bytes = match (entry.get("uri").and_then(Value::as_str), &self.bin) {
-            (Some(uri), _) => Cow::Owned(self.fetch(uri, &what)?),
+            (Some(uri), _) => Cow::Owned(self.fetch(uri, &what, Purpose::Buffer)?),
             (None, Some(bin)) if buffer == 0 => Cow::Borrowed(bin.as_slice()),
             _ => {
                 return Err(Error::malformed(
@@ -748,8 +787,36 @@ impl Document {
         })
     }
 
-    fn fetch(&self, uri: &str, what: &str) -> Result<Vec<u8>, Error> {
-        crate::container::fetch(&self.path, what, uri, &crate::container::beside(&self.path))
+    fn fetch(&self, uri: &str, what: &str, purpose: Purpose) -> Result<Vec<u8>, Error> {
+        fetch(&self.path, what, purpose, uri, &beside(&self.path, &self.allowed))
+    }
+}
+
+/// A document and the files beside it, as they are about to be written.
+#[derive(Clone, Debug)]
+pub struct Packed {
+    /// Paths and contents, the document last.
+    pub files: Vec<(PathBuf, Vec<u8>)>,
+    /// What could not be cleaned up.
+    pub warnings: Vec<String>,
+}
+
+impl Packed {
+    /// Writes the files, each whole or not at all.
+    ///
+    /// # Errors
+    /// When one cannot be written; those before it are.
+    pub fn write(&self) -> Result<(), Error> {
+        for (i, (file, bytes)) in self.files.iter().enumerate() {
+            // The document's own folder is the caller's to make.
+            if i + 1 < self.files.len()
+                && let Some(folder) = file.parent()
+            {
+                std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
+            }
+            write_atomically(file, bytes)?;
+        }
+        Ok(())
     }
 }
 

@@ -27,6 +27,22 @@ pub enum Error {
         /// What it needs, and what to do about it.
         reason: String,
     },
+    /// A document names a file outside of its own folder, and nobody has allowed that.
+    #[error(
+        "{}: {what}: the file \"{file}\" lies outside of the model's folder; put it there, or, if you trust the \
+         model, allow the folder with --allow-outside {}",
+        path.display(), folder.display()
+    )]
+    Outside {
+        /// The document.
+        path: PathBuf,
+        /// The place in it.
+        what: String,
+        /// The path that stands there.
+        file: String,
+        /// The folder that the file is in.
+        folder: PathBuf,
+    },
     /// An image could not be read; the message names it.
     #[error(transparent)]
     Image(#[from] kinran_image::Error),

@@ -22,7 +22,7 @@ mod tangent;
 pub use detail::{
     DETAIL_EXTENSION, DETAIL_LAYERS_MAX, Detail, DetailLayer, DetailMap, DetailMask, LayerTransform,
 };
-pub use document::{Attribute, Document, Object, Slot, TextureExtension};
+pub use document::{Attribute, Document, Object, Packed, Slot, TextureExtension};
 pub use environment::Environment;
 pub use error::Error;
 pub use fuzz::{FUZZ_EXTENSION, Fuzz, FuzzAttenuation, FuzzDirection, FuzzLayer, FuzzPhase, SHEEN_MATCH};

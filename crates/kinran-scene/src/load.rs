@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde::Deserialize;
 
 use crate::accessor::Accessors;
-use crate::container::{Resolver, beside, fetch, read_regular_file, split};
+use crate::container::{GivenResolver, Purpose, Resolver, beside, fetch, given, read_regular_file, split};
 use crate::obj::glb_from_obj;
 use crate::{
     AlphaMode, Anisotropy, Camera, DiffuseTransmission, Error, FUZZ_EXTENSION, Fuzz, FuzzAttenuation,
@@ -86,22 +86,35 @@ impl Scene {
     /// # Errors
     /// One that names the file and the place in it: files that are missing, truncated or no glTF, indices
     /// and ranges that point nowhere, numbers that are not finite, required extensions that are not
-    /// implemented. Memory stays in proportion to the files' sizes.
+    /// implemented, and [`Error::Outside`] for a file outside of the document's folder. Memory stays in proportion to
+    /// the files' sizes.
     pub fn load(path: impl AsRef<Path>) -> Result<Scene, Error> {
+        Scene::load_allowing(path, &[])
+    }
+
+    /// As [`Scene::load`]; the document may also name files of these folders.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn load_allowing(path: impl AsRef<Path>, allowed: &[PathBuf]) -> Result<Scene, Error> {
         let path = path.as_ref();
         let mut bytes = read_regular_file(path).map_err(|error| Error::io(path, error))?;
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
             bytes = glb_from_obj(path, &bytes)?;
         }
-        Scene::from_bytes(path, &bytes, &beside(path))
+        Scene::read(path, &bytes, &beside(path, allowed))
     }
 
     /// Reads a document from memory. `name` stands for it in messages; `resolve` gives the bytes of a
-    /// relative, percent-decoded path that the document names.
+    /// relative, percent-decoded path that the document names, and is asked for no path that leaves the document's folder.
     ///
     /// # Errors
     /// As [`Scene::load`].
-    pub fn from_bytes(name: &Path, bytes: &[u8], resolve: &Resolver<'_>) -> Result<Scene, Error> {
+    pub fn from_bytes(name: &Path, bytes: &[u8], resolve: &GivenResolver<'_>) -> Result<Scene, Error> {
+        Scene::read(name, bytes, &given(resolve))
+    }
+
+    fn read(name: &Path, bytes: &[u8], resolve: &Resolver<'_>) -> Result<Scene, Error> {
         let container = split(name, bytes)?;
         let root: json::Root = serde_json::from_slice(container.json)
             .map_err(|error| Error::malformed(name, format!("the JSON does not describe glTF: {error}")))?;
@@ -158,7 +171,7 @@ fn load_buffers(
         .map(|(i, buffer)| {
             let what = format!("buffer {i}");
             let bytes = match (&buffer.uri, bin) {
-                (Some(uri), _) => fetch(name, &what, uri, resolve)?,
+                (Some(uri), _) => fetch(name, &what, Purpose::Buffer, uri, resolve)?,
                 (None, Some(bin)) if i == 0 => bin.to_vec(),
                 _ => return Err(Error::malformed(name, format!("{what} has no uri and no GLB chunk to be"))),
             };
@@ -1088,7 +1101,7 @@ impl Loader<'_> {
         let image = &self.root.images[index];
         let (name, bytes) = match (&image.uri, image.buffer_view) {
             (Some(uri), _) => {
-                *fetched = fetch(self.name, &what, uri, resolve)?;
+                *fetched = fetch(self.name, &what, Purpose::Image, uri, resolve)?;
                 let name = if uri.starts_with("data:") { what } else { format!("{what} \"{uri}\"") };
                 (name, fetched.as_slice())
             }

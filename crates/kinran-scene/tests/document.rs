@@ -362,7 +362,9 @@ fn files_outside_the_folder_are_copied_into_it_and_several_buffers_become_one() 
     let path = folder.path().join("model/m.gltf");
     std::fs::write(&path, serde_json::to_vec(&json).unwrap()).unwrap();
     let written = folder.path().join("out/m.glb");
-    Document::open(&path).unwrap().write(&written).unwrap();
+    let refused = Document::open(&path).unwrap().write(&written).unwrap_err().to_string();
+    assert!(refused.contains("outside of the model's folder"), "{refused}");
+    Document::open_allowing(&path, &[folder.path().join("shared")]).unwrap().write(&written).unwrap();
 
     let again = Document::open(&written).unwrap();
     assert_eq!(again.json()["buffers"], json!([{ "byteLength": 11 }]));

@@ -10,14 +10,17 @@ mod settings;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use kinran_bake::aniso::{Filter, Kernel, SurfaceOptions};
+use kinran_bake::aniso::{Filter, Kernel, Sheet, SurfaceOptions};
 use kinran_bake::folder::{Green, Hints, Role as MapRole};
 use kinran_image::{
-    Encoder, Encoding, Format, Preset, Role, Texture, encode_dds, encode_ktx2, write_atomically,
+    Encoder, Encoding, Format, Preset, Role, Texture, encode_dds, encode_ktx2, full_level_count, level_size,
+    write_atomically,
 };
 use kinran_scene::Wrap;
 
-use crate::outputs::{check_folder, has_extension};
+use crate::content::Content;
+use crate::model::ModelArgs;
+use crate::outputs::{Space, check_folder, has_extension};
 use crate::values::{filter, number};
 use crate::{Console, Error};
 
@@ -145,11 +148,19 @@ pub struct Args {
 
     #[command(flatten)]
     #[allow(missing_docs)]
+    pub model: ModelArgs,
+
+    #[command(flatten)]
+    #[allow(missing_docs)]
     pub curvature: CurvatureArgs,
 
     /// Only say what was understood
     #[arg(long)]
     pub dry_run: bool,
+
+    /// Overwrites files that kinran did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
 
     /// Flags that only a manifest takes.
     #[command(flatten)]
@@ -350,6 +361,9 @@ impl Args {
 /// Whatever is wrong with the input, the flags or the output folder; nothing half-written stays.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if !args.input.is_dir() && has_extension(&args.input, "toml") {
+        if args.force {
+            return Err(Error::Usage("--force is for one folder or model; a kinran.toml needs none".into()));
+        }
         return bake_library(args, console);
     }
     if args.library != LibraryArgs::default() {
@@ -404,10 +418,45 @@ fn check_formats(args: &Args) -> Result<(), Error> {
     Ok(())
 }
 
+/// The role of a sheet's texels.
+fn role_of(sheet: Sheet) -> Role {
+    match sheet {
+        Sheet::Normal => Role::Normal,
+        Sheet::Roughness | Sheet::IsotropicRoughness => Role::Data,
+        Sheet::Aniso | Sheet::KhrAnisotropy => Role::Aniso,
+    }
+}
+
+/// The format that flags give a sheet.
+fn sheet_format(args: &Args, sheet: Sheet) -> Option<FormatName> {
+    if sheet == Sheet::Normal { args.normal_format } else { args.aniso_format }
+}
+
+/// The files of a texture.
+fn texture_files(args: &Args, name: &str) -> Vec<String> {
+    args.container.extensions().iter().map(|extension| format!("{name}.{extension}")).collect()
+}
+
+/// What Zstandard leaves of a mip chain at least, as one over this; chosen by eye: BC7 of smooth maps keeps an eighth.
+const ZSTD_LEAST: u64 = 16;
+
+/// Bytes of a texture's files.
+fn texture_space(args: &Args, format: Format, (width, height): (u32, u32)) -> Space {
+    let levels = 0..full_level_count(width, height);
+    let chain = levels.map(|level| format.level_bytes(level_size(width, level), level_size(height, level)));
+    let chain = chain.sum::<usize>() as u64;
+    let mut space = Space::default();
+    for extension in args.container.extensions() {
+        let shrinks = *extension == "ktx2" && args.zstd > 0;
+        space.add(Space { least: if shrinks { chain / ZSTD_LEAST } else { chain }, most: chain });
+    }
+    space
+}
+
 /// Writes a texture in the containers asked for; gives the reports of the files.
-fn write_texture(args: &Args, name: &str, map: &str, mut texture: Texture) -> Result<Vec<Output>, Error> {
+fn write_texture(args: &Args, name: &str, map: Content, mut texture: Texture) -> Result<Vec<Output>, Error> {
     std::fs::create_dir_all(args.output()).map_err(|e| kinran_image::Error::io(args.output(), e))?;
-    texture.metadata.insert("KinranMap".into(), map.into());
+    map.mark(&mut texture);
     texture.metadata.insert("KinranFilter".into(), args.filter.name().into());
     args.container
         .extensions()

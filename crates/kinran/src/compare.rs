@@ -217,7 +217,12 @@ pub struct Comparison {
 /// the file.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     outputs::check_folder(&args.output)?;
-    let scene = Scene::load(&args.file)?;
+    let series = std::iter::once("truth").chain(args.filters.iter().map(|filter| filter.name()));
+    let pictures =
+        series.flat_map(|name| args.distances.iter().map(move |distance| picture_file(name, *distance)));
+    let pictures = pictures.chain(["compare.png".into(), "distance.png".into()]);
+    args.view.refuse_inputs(&args.file, pictures.map(|picture| args.output.join(picture)))?;
+    let scene = Scene::load_allowing(&args.file, args.view.model.allowed()?)?;
     let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
     let options = Options {
         filters: distinct(&args.filters),
@@ -233,6 +238,11 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     comparison.write(&args.output)?;
     let text = format!("{}\nPictures and numbers are in {}", comparison.table(), args.output.display());
     console.result(&comparison.report, &text)
+}
+
+/// The name of a picture of a filter or of ground truth.
+fn picture_file(series: &str, distance: f32) -> String {
+    format!("{series}_x{distance}.png")
 }
 
 /// The values without repetitions, in their order.
@@ -594,7 +604,7 @@ impl Comparison {
         std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
         for series in &self.series {
             for (picture, difference) in series.pictures.iter().zip(&self.report.methods[0].distances) {
-                picture.write(&folder.join(format!("{}_x{}.png", series.name, difference.distance)))?;
+                picture.write(&folder.join(picture_file(series.name, difference.distance)))?;
             }
         }
         self.sheet().write(&folder.join("compare.png"))?;

@@ -123,6 +123,7 @@ struct Summary {
 /// One that names the file that could not be written.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     outputs::check_folder(&args.output)?;
+    outputs::refuse_other_page(&args.output.join("index.html"))?;
     let scale = if args.quick { &QUICK } else { &FULL };
     let progress = console.progress();
     for subject in Subject::ALL {
@@ -232,7 +233,9 @@ fn bake_textures(maps: &Path, output: &Path) -> Result<(), Error> {
     }
     let words = [Path::new("bake"), maps, Path::new("--output"), output].map(Path::as_os_str);
     let flags = Flags::try_parse_from(words).map_err(|e| Error::Internal(e.to_string()))?;
-    bake::run(&flags.bake, &Console { quiet: true, ..Console::default() })
+    // Everything in the demo's folder is the demo's.
+    let bake = bake::Args { force: true, ..flags.bake };
+    bake::run(&bake, &Console { quiet: true, ..Console::default() })
 }
 
 /// The model's own camera and lights; of the built-in studio only the diffuse light, which has no noise.

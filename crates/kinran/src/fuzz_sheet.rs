@@ -188,12 +188,14 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         [] => Sheet::value_variants().iter().copied().filter(|&s| s != Sheet::Realtime).collect(),
         named => named.to_vec(),
     };
+    let pictures = sheets.iter().map(|&sheet| args.output.join(sheet_file(sheet)));
+    args.view.refuse_inputs(&args.file, pictures)?;
     let painter = args.backend.open(None)?;
     let realtime = match sheets.contains(&Sheet::Realtime) {
         true => Some(Backend::Gpu.open(None)?),
         false => None,
     };
-    let Model { path, mut scene, only_baked } = Model::open(&args.file)?;
+    let Model { path, mut scene, only_baked } = Model::open(&args.file, &args.view.model)?;
     for material in &mut scene.materials {
         if let Some(base) = base {
             material.base_color_factor = base.extend(material.base_color_factor.w);
@@ -227,7 +229,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let mut text = String::new();
     let (mut files, mut flip) = (Vec::new(), Vec::new());
     for sheet in sheets {
-        let name = format!("{}.png", sheet.to_possible_value().expect("no sheet is hidden").get_name());
+        let name = sheet_file(sheet);
         let picture = match &realtime {
             Some(gpu) if sheet == Sheet::Realtime => {
                 let picture;
@@ -245,6 +247,11 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     write!(text, "{} sheets of {} are in {}", files.len(), file_name(&args.file), args.output.display())
         .expect("strings grow");
     console.result(&Summary { files, flip, warnings }, &text)
+}
+
+/// The name of a sheet's picture.
+fn sheet_file(sheet: Sheet) -> String {
+    format!("{}.png", sheet.to_possible_value().expect("no sheet is hidden").get_name())
 }
 
 /// What a picture shows.

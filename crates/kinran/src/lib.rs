@@ -9,6 +9,7 @@ pub mod cache;
 pub mod compare;
 mod compare_sheet;
 mod console;
+pub mod content;
 pub mod demo;
 pub mod detail;
 mod error;

@@ -1,6 +1,6 @@
 //! What a path shows: a glTF file, a folder that holds one, or a folder of baked textures.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
@@ -9,6 +9,32 @@ use kinran_scene::{Anisotropy, Instance, Material, Primitive, Scene, Source, Tex
 use serde::Deserialize;
 
 use crate::Error;
+use crate::content::Content;
+
+/// The flag about files that a model names.
+#[derive(Clone, Debug, Default, PartialEq, Eq, clap::Args)]
+pub struct ModelArgs {
+    /// Lets the model name files of this folder too, such as textures that several models share; may be given again.
+    /// A model that names files outside of its own folder is refused otherwise
+    #[arg(long, value_name = "DIR")]
+    pub allow_outside: Vec<PathBuf>,
+}
+
+impl ModelArgs {
+    /// The folders that are allowed.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where one does not exist.
+    pub fn allowed(&self) -> Result<&[PathBuf], Error> {
+        match self.allow_outside.iter().find(|folder| !folder.is_dir()) {
+            Some(folder) => Err(Error::Usage(format!(
+                "--allow-outside {}: there is no such folder; name one that exists",
+                folder.display()
+            ))),
+            None => Ok(&self.allow_outside),
+        }
+    }
+}
 
 /// A model and where it comes from.
 #[derive(Clone, Debug)]
@@ -24,6 +50,8 @@ pub struct Model {
 /// The sidecar of a bake, as far as it says which file is what.
 #[derive(Deserialize)]
 struct Sidecar {
+    /// None where the report is one of skin tables.
+    #[serde(default)]
     surfaces: Vec<Surface>,
 }
 
@@ -99,10 +127,10 @@ impl Model {
     ///
     /// # Errors
     /// Those of [`Place::of`] and of the files.
-    pub fn open(path: &Path) -> Result<Self, Error> {
+    pub fn open(path: &Path, args: &ModelArgs) -> Result<Self, Error> {
         match Place::of(path)? {
             Place::File(path) => {
-                let scene = Scene::load(&path)?;
+                let scene = Scene::load_allowing(&path, args.allowed()?)?;
                 Ok(Model { path, scene, only_baked: false })
             }
             Place::Textures(path, sidecars) => {
@@ -137,6 +165,18 @@ fn boards(folder: &Path, sidecars: &[PathBuf]) -> Result<Scene, Error> {
     Ok(scene)
 }
 
+/// A file that a sidecar names, which must lie beside it.
+fn beside(folder: &Path, file: &str) -> Result<PathBuf, Error> {
+    let mut parts = Path::new(file).components();
+    match (parts.next(), parts.next()) {
+        (Some(Component::Normal(_)), None) if !file.contains('\\') => Ok(folder.join(file)),
+        _ => Err(Error::Usage(format!(
+            "{}: a sidecar names \"{file}\", which does not lie beside it; bake again",
+            folder.display()
+        ))),
+    }
+}
+
 /// A surface's textures as a material.
 fn material(folder: &Path, surface: Surface, scene: &mut Scene) -> Result<Material, Error> {
     let mut material = Material {
@@ -147,25 +187,27 @@ fn material(folder: &Path, surface: Surface, scene: &mut Scene) -> Result<Materi
         ..Material::default()
     };
     for output in surface.outputs {
-        let place = texture(&folder.join(&output.file), scene)?;
-        match output.map.as_str() {
+        let place = texture(&beside(folder, &output.file)?, scene)?;
+        match Content::named(&output.map) {
             // With KTX2 and DDS of the same map, either will do.
-            "normal" => material.normal = Some(place),
-            "aniso" => material.aniso = Some(place),
-            "anisotropy" => {
+            Some(Content::Normal) => material.normal = Some(place),
+            Some(Content::Aniso) => material.aniso = Some(place),
+            Some(Content::Anisotropy) => {
                 material.anisotropy = Some(Anisotropy { strength: 1.0, rotation: 0.0, texture: Some(place) });
             }
-            "roughness" => material.metallic_roughness = Some(place),
-            "orm" => {
+            Some(Content::Roughness) => material.metallic_roughness = Some(place),
+            Some(Content::Orm) => {
                 material.metallic_factor = 1.0;
                 material.occlusion = Some(place.clone());
                 material.metallic_roughness = Some(place);
             }
-            "color" => {
+            Some(Content::Color) => {
                 material.base_color_factor = Vec4::ONE;
                 material.base_color = Some(place);
             }
-            other => scene.warnings.push(format!("{}: a map \"{other}\" is not drawn", output.file)),
+            _ => {
+                scene.warnings.push(format!("{}: a map \"{}\" is not drawn", output.file, output.map));
+            }
         }
     }
     Ok(material)
@@ -213,7 +255,12 @@ mod tests {
         std::fs::write(folder.path().join("a.kinran.json"), "").unwrap();
         let sidecars = vec![folder.path().join("a.kinran.json")];
         assert_eq!(of(folder.path()), Ok(Place::Textures(folder.path().into(), sidecars)));
-        assert!(Model::open(folder.path()).unwrap_err().to_string().contains("a.kinran.json"));
+        assert!(
+            Model::open(folder.path(), &ModelArgs::default())
+                .unwrap_err()
+                .to_string()
+                .contains("a.kinran.json")
+        );
         std::fs::write(folder.path().join("a.glb"), "").unwrap();
         std::fs::write(folder.path().join("a.png"), "").unwrap();
         assert_eq!(of(folder.path()), Ok(Place::File(folder.path().join("a.glb"))));

@@ -1,6 +1,11 @@
-//! Finding out that output cannot be written before long work, not after it.
+//! Files that commands write: whose they are, whether they can be written, and what is known of them afterwards. All
+//! that can be refused is refused before long work, not after it.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+
+use kinran_scene::Packed;
+use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
@@ -32,12 +37,17 @@ pub(crate) fn check_file(path: &Path, extensions: &[&str]) -> Result<(), Error> 
 
 /// Refuses a folder that neither exists nor can be made, or that cannot be written to.
 pub(crate) fn check_folder(path: &Path) -> Result<(), Error> {
-    let full = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    let existing: PathBuf = full.ancestors().find(|p| p.exists()).unwrap_or(&full).to_path_buf();
+    let existing = existing_folder(path);
     if !existing.is_dir() {
         return Err(Error::Usage(format!("{}: is a file; name a folder", existing.display())));
     }
     check_writable(&existing)
+}
+
+/// The path, or the nearest folder above it that is there.
+fn existing_folder(path: &Path) -> PathBuf {
+    let full = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    full.ancestors().find(|p| p.exists()).unwrap_or(&full).to_path_buf()
 }
 
 fn check_writable(folder: &Path) -> Result<(), Error> {
@@ -46,4 +56,236 @@ fn check_writable(folder: &Path) -> Result<(), Error> {
         .map(drop)
         // The error itself would name the temporary file.
         .map_err(|e| kinran_image::Error::io(folder, e.kind().into()).into())
+}
+
+/// Refuses to write a file over one that the work is made from.
+pub(crate) fn refuse_input<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Error> {
+    let Ok(existing) = output.canonicalize() else { return Ok(()) };
+    let same = |input: &Path| input.canonicalize().is_ok_and(|input| input == existing);
+    if inputs.into_iter().any(same) {
+        return Err(Error::Usage(format!(
+            "{}: is read and would be overwritten; choose another --output",
+            output.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Refuses to overwrite a page that kinran did not write, which is told by its title.
+pub(crate) fn refuse_other_page(page: &Path) -> Result<(), Error> {
+    let Ok(text) = std::fs::read(page) else { return Ok(()) };
+    if String::from_utf8_lossy(&text).contains("<title>Kinran") {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "{}: is a page that kinran did not write; name another folder with --output",
+        page.display()
+    )))
+}
+
+/// A path from a folder, `/`-separated.
+pub(crate) fn relative(folder: &Path, path: &Path) -> String {
+    let path = path.strip_prefix(folder).unwrap_or(path);
+    path.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
+}
+
+/// Of what a document takes along, the files that would change what is there, and the document itself.
+pub(crate) fn changed_files(folder: &Path, packed: &Packed) -> Vec<String> {
+    let last = packed.files.len().saturating_sub(1);
+    let files = packed.files.iter().enumerate();
+    let changed = files
+        .filter(|(i, (path, bytes))| *i == last || std::fs::read(path).is_ok_and(|there| there != *bytes));
+    changed.map(|(_, (path, _))| relative(folder, path)).collect()
+}
+
+/// A file that was written, as the report beside it names it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct WrittenFile {
+    /// Its path from the report's folder, `/`-separated.
+    pub file: String,
+    /// Its size.
+    pub bytes: usize,
+    /// BLAKE3 of its bytes.
+    pub blake3: String,
+}
+
+impl WrittenFile {
+    /// What is known of a file by its bytes.
+    pub(crate) fn new(file: impl Into<String>, bytes: &[u8]) -> Self {
+        let blake3 = blake3::hash(bytes).to_hex().to_string();
+        WrittenFile { file: file.into(), bytes: bytes.len(), blake3 }
+    }
+
+    /// What is known of a file that was just written to `folder`.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    pub(crate) fn of(folder: &Path, file: impl Into<String>) -> Result<Self, Error> {
+        let file = file.into();
+        let path = folder.join(&file);
+        let bytes = match path.is_file() {
+            true => std::fs::read(&path),
+            false => Err(std::io::Error::other("is no regular file; move it away")),
+        };
+        let bytes = bytes.map_err(|e| kinran_image::Error::io(&path, e))?;
+        Ok(WrittenFile::new(file, &bytes))
+    }
+}
+
+/// The end of a report's name, by which a later run finds it.
+const REPORTS: [&str; 2] = [".kinran.json", ".detail.json"];
+
+/// A report, as far as it says which files are its own.
+#[derive(Deserialize)]
+struct KnownFiles {
+    written: Vec<WrittenFile>,
+}
+
+fn is_report(file: &str) -> bool {
+    REPORTS.iter().any(|end| file.ends_with(end))
+}
+
+/// Refuses to overwrite, in `folder`, files that no earlier run wrote there, or that somebody has changed since: what a
+/// report beside them names, with the hash that it has now, is written again without a question.
+///
+/// # Errors
+/// [`Error::Usage`] that names the file; also for a folder in the place of a file, which `force` does not help.
+pub(crate) fn refuse_foreign(folder: &Path, files: &[String], force: bool) -> Result<(), Error> {
+    let mut known: Option<BTreeSet<WrittenFile>> = None;
+    // A report that is none explains why nothing else is known.
+    let (reports, others): (Vec<&String>, Vec<&String>) = files.iter().partition(|file| is_report(file));
+    for file in reports.into_iter().chain(others) {
+        let path = folder.join(file);
+        if path.is_dir() {
+            return Err(Error::Usage(format!(
+                "{}: is a folder where a file must be written; move it away, or name another folder with --output",
+                path.display()
+            )));
+        }
+        if force || !path.exists() {
+            continue;
+        }
+        let ours = if is_report(file) {
+            read_report(&path).is_some()
+        } else {
+            let known = known.get_or_insert_with(|| known_files(folder));
+            known.contains(&WrittenFile::of(folder, file)?)
+        };
+        if !ours {
+            return Err(Error::Usage(format!(
+                "{}: kinran did not write this file, or it was changed since; move it away, name another folder with \
+                 --output, or overwrite it with --force",
+                path.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// What the reports in a folder name.
+fn known_files(folder: &Path) -> BTreeSet<WrittenFile> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let reports = entries.map(|e| e.path()).filter(|path| is_report(&path.to_string_lossy()));
+    reports.filter_map(|path| read_report(&path)).flat_map(|report| report.written).collect()
+}
+
+fn read_report(path: &Path) -> Option<KnownFiles> {
+    serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+}
+
+/// Bytes that files will take, as far as that can be told before they are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Space {
+    /// They take no less.
+    pub(crate) least: u64,
+    /// They take no more, but for what is not told here.
+    pub(crate) most: u64,
+}
+
+impl Space {
+    pub(crate) fn add(&mut self, other: Space) {
+        self.least += other.least;
+        self.most += other.most;
+    }
+}
+
+/// Refuses output for which the disk of `folder` has clearly no room. The sentence that it may give is a warning: it
+/// may be too little.
+///
+/// # Errors
+/// [`Error::Usage`] with both numbers.
+pub(crate) fn check_space(folder: &Path, needed: Space) -> Result<Option<String>, Error> {
+    // A disk that does not tell is no reason to stop.
+    let Ok(free) = fs4::available_space(existing_folder(folder)) else { return Ok(None) };
+    room(folder, needed, free)
+}
+
+fn room(folder: &Path, needed: Space, free: u64) -> Result<Option<String>, Error> {
+    let (place, free_text) = (folder.display(), bytes_text(free));
+    if free < needed.least {
+        return Err(Error::Usage(format!(
+            "{place}: the files take at least {} and {free_text} are free; free some space or choose another disk",
+            bytes_text(needed.least)
+        )));
+    }
+    Ok((free < needed.most).then(|| {
+        let most = bytes_text(needed.most);
+        format!("{place}: the files may take {most} and {free_text} are free")
+    }))
+}
+
+/// Bytes as people read them.
+pub(crate) fn bytes_text(bytes: u64) -> String {
+    match bytes {
+        0..1_024 => format!("{bytes} B"),
+        1_024..1_048_576 => format!("{:.1} KiB", bytes as f64 / 1_024.0),
+        1_048_576..1_073_741_824 => format!("{:.1} MiB", bytes as f64 / 1_048_576.0),
+        _ => format!("{:.1} GiB", bytes as f64 / 1_073_741_824.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_disk_is_found_out_after_the_work() {
+        let needed = Space { least: 3 << 30, most: 5 << 30 };
+        let of = |free: u64| room(Path::new("out"), needed, free).map_err(|e| e.to_string());
+        let refused = of((3 << 30) - 1).unwrap_err();
+        assert_eq!(
+            refused,
+            "out: the files take at least 3.0 GiB and 3.0 GiB are free; free some space or choose another disk"
+        );
+        assert_eq!(of(4 << 30).unwrap().unwrap(), "out: the files may take 5.0 GiB and 4.0 GiB are free");
+        assert_eq!(of(5 << 30).unwrap(), None);
+    }
+
+    #[test]
+    fn a_file_that_somebody_changed_is_taken_for_ours() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let write = |name: &str, text: &str| std::fs::write(path(name), text).unwrap();
+        let refused = |names: &[&str], force| {
+            let names: Vec<String> = names.iter().map(|&n| n.into()).collect();
+            refuse_foreign(folder.path(), &names, force).map_err(|e| e.to_string())
+        };
+        write("a.ktx2", "a");
+        assert!(refused(&["a.ktx2"], false).unwrap_err().contains("a.ktx2: kinran did not write"));
+        refused(&["a.ktx2"], true).unwrap();
+        refused(&["b.ktx2", "m.kinran.json"], false).unwrap();
+
+        let report = serde_json::json!({ "written": [WrittenFile::of(folder.path(), "a.ktx2").unwrap()] });
+        write("m.kinran.json", &report.to_string());
+        refused(&["a.ktx2", "m.kinran.json"], false).unwrap();
+        write("a.ktx2", "b");
+        assert!(refused(&["a.ktx2"], false).unwrap_err().contains("a.ktx2"));
+        write("m.kinran.json", "{ \"notes\": \"mine\" }");
+        assert!(refused(&["m.kinran.json"], false).unwrap_err().contains("m.kinran.json"));
+        std::fs::create_dir(path("d.ktx2")).unwrap();
+        assert!(refused(&["d.ktx2"], true).unwrap_err().contains("is a folder"));
+    }
 }

@@ -97,8 +97,9 @@ struct Summary {
 /// the file.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     outputs::check_file(&args.output, &["png", "exr"])?;
+    args.view.refuse_inputs(&args.file, [args.output.clone()])?;
     let painter = args.backend.open(args.shaders.as_deref())?;
-    let Model { path, scene, only_baked } = Model::open(&args.file)?;
+    let Model { path, scene, only_baked } = Model::open(&args.file, &args.view.model)?;
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
     let own = Mips::of(&scene);
     let mips = args.filter.unwrap_or(own);

@@ -35,6 +35,10 @@ pub struct Args {
     #[arg(long, short, value_name = "DIR")]
     pub output: Option<PathBuf>,
 
+    /// Overwrites files whose content is another: that of another version, or what somebody wrote
+    #[arg(long)]
+    pub force: bool,
+
     /// This module and those it needs, and no others; without --output they are printed
     #[arg(long, value_name = "NAME")]
     pub module: Option<String>,
@@ -130,7 +134,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         return Console { quiet: false, ..console.clone() }.result(&report, &text);
     };
     outputs::check_folder(folder)?;
-    let files = write(language, args.module.is_none(), &chosen, folder)?;
+    let files = write(language, args.module.is_none(), &chosen, folder, args.force)?;
     let summary = format!("{} files are in {}", files.len(), folder.display());
     console.result(&Report { language, files, text: None }, &summary)
 }
@@ -186,7 +190,13 @@ fn text(language: Language, name: Option<&str>, chosen: &[Module]) -> Result<Str
 }
 
 /// Writes the files, and tells their names.
-fn write(language: Language, whole: bool, chosen: &[Module], folder: &Path) -> Result<Vec<String>, Error> {
+fn write(
+    language: Language,
+    whole: bool,
+    chosen: &[Module],
+    folder: &Path,
+    force: bool,
+) -> Result<Vec<String>, Error> {
     let (_, all, readme, extension) = language.texts();
     let mut files: Vec<(String, &[u8])> = vec![("README.md".to_owned(), readme.as_bytes())];
     files.extend(chosen.iter().map(|m| (format!("{}.{extension}", m.name), m.text.as_bytes())));
@@ -194,6 +204,15 @@ fn write(language: Language, whole: bool, chosen: &[Module], folder: &Path) -> R
         files.push(("kinran.spv".to_owned(), SPIRV));
     } else if let (true, Some(all)) = (whole, all) {
         files.push((format!("kinran.{extension}"), all.as_bytes()));
+    }
+    let other = |(name, bytes): &&(String, &[u8])| {
+        std::fs::read(folder.join(name)).is_ok_and(|there| there != *bytes)
+    };
+    if let Some((name, _)) = files.iter().find(other).filter(|_| !force) {
+        return Err(Error::Usage(format!(
+            "{}: is there with another content; name another folder with --output, or overwrite it with --force",
+            folder.join(name).display()
+        )));
     }
     std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
     for (name, bytes) in &files {

@@ -14,7 +14,8 @@ use kinran_shading::skin::profile::{Gaussian, ProfileError};
 use serde::Serialize;
 
 use crate::bake::Container;
-use crate::outputs::check_folder;
+use crate::content::Content;
+use crate::outputs::{WrittenFile, check_folder, refuse_foreign, refuse_input};
 use crate::values::{number, size};
 use crate::{Console, Error};
 
@@ -86,6 +87,10 @@ pub struct Args {
     /// Also the table of light that scatters into penumbras
     #[arg(long)]
     pub penumbra: bool,
+
+    /// Overwrites files that kinran did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Texels and their encoding.
@@ -124,6 +129,8 @@ struct Report {
     /// 1/mm at the lower edge of the punctual table and the right edge of the ambient one.
     range: f32,
     tables: Vec<TableReport>,
+    /// Every file that was written beside this report.
+    written: Vec<WrittenFile>,
 }
 
 /// A table.
@@ -156,6 +163,18 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     };
     let radial = profile.radial().map_err(refuse)?;
     check_folder(&args.output)?;
+    let mut files: Vec<String> = Vec::new();
+    let penumbra = args.penumbra.then_some(Content::SkinPenumbra);
+    for content in [Content::SkinPunctual, Content::SkinAmbient].into_iter().chain(penumbra) {
+        files.extend(args.container.extensions().iter().map(|e| table_file(args, content, e)));
+    }
+    files.push(format!("{}.png", args.name));
+    let sidecar = format!("{}.kinran.json", args.name);
+    let all: Vec<String> = files.iter().chain([&sidecar]).cloned().collect();
+    for file in &all {
+        refuse_input(&args.output.join(file), args.profile.as_deref())?;
+    }
+    refuse_foreign(&args.output, &all, args.force)?;
     std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
 
     let (width, height) = (args.size.0 as usize, args.size.1 as usize);
@@ -170,24 +189,27 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         scale: args.scale,
         range: args.range,
         tables: Vec::new(),
+        written: Vec::new(),
     };
-    let mut add = |name: &str, table: &Table, across, down, interpolation_error| -> Result<(), Error> {
-        report.tables.push(write_table(args, name, table, across, down, interpolation_error)?);
+    let mut add = |content, table: &Table, across, down, interpolation_error| -> Result<(), Error> {
+        report.tables.push(write_table(args, content, table, across, down, interpolation_error)?);
         Ok(())
     };
-    add("punctual", &punctual, "n·u from -1 to 1", "curvature from 0 to range", Some(error))?;
-    add("ambient", &ambient, "mean curvature from 0 to range", "band 1, band 2", None)?;
+    add(Content::SkinPunctual, &punctual, "n·u from -1 to 1", "curvature from 0 to range", Some(error))?;
+    add(Content::SkinAmbient, &ambient, "mean curvature from 0 to range", "band 1, band 2", None)?;
     if args.penumbra {
         let table = penumbra_table(radial, 64.min(width), 64.min(height), 1.0);
         let down = "one over the penumbra's width from 0 to 1/mm";
-        add("penumbra", &table, "filtered shadow from 0 to 1", down, None)?;
+        add(Content::SkinPenumbra, &table, "filtered shadow from 0 to 1", down, None)?;
     }
     let title = format!("{}, {}", args.name, report.profile);
     plot::plot(&title, &punctual, &ambient, args.range)
         .write(&args.output.join(format!("{}.png", args.name)))?;
+    report.written =
+        files.iter().map(|file| WrittenFile::of(&args.output, file)).collect::<Result<_, _>>()?;
     let mut text = serde_json::to_string_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
     text.push('\n');
-    write_atomically(&args.output.join(format!("{}.kinran.json", args.name)), text.as_bytes())?;
+    write_atomically(&args.output.join(sidecar), text.as_bytes())?;
 
     let mut lines = String::new();
     for table in &report.tables {
@@ -238,9 +260,14 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
+/// The name of a table's file: `skin_punctual.ktx2` where `--name` is `skin`.
+fn table_file(args: &Args, content: Content, extension: &str) -> String {
+    format!("{}_{}.{extension}", args.name, content.name().trim_start_matches("skin-"))
+}
+
 fn write_table(
     args: &Args,
-    name: &str,
+    content: Content,
     table: &Table,
     across: &'static str,
     down: &'static str,
@@ -252,11 +279,11 @@ fn write_table(
         FormatName::Rgba8 => (TableFormat::Linear8, "rgba8"),
     };
     let mut texture: Texture = table.texture(format)?;
-    texture.metadata.insert("KinranMap".into(), format!("skin {name}"));
+    content.mark(&mut texture);
     texture.metadata.insert("KinranRange".into(), args.range.to_string());
     let mut files = Vec::new();
     for extension in args.container.extensions() {
-        let file = format!("{}_{name}.{extension}", args.name);
+        let file = table_file(args, content, extension);
         let bytes = match *extension {
             "dds" => encode_dds(&texture)?,
             _ => encode_ktx2(&texture, None)?,

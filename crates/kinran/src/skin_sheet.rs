@@ -146,10 +146,13 @@ struct Summary {
 /// One that names the flag or the file.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     outputs::check_folder(&args.output)?;
+    let sheets = if args.sheet.is_empty() { Sheet::value_variants() } else { &args.sheet };
+    let pictures = sheets.iter().map(|&sheet| args.output.join(sheet_file(sheet)));
+    args.view.refuse_inputs(&args.file, pictures)?;
     if let Some(c) = args.base.filter(|c| c.min_element() < 0.0 || c.max_element() > 1.0) {
         return Err(Error::Usage(format!("--base {},{},{}: each must lie in 0 to 1", c.x, c.y, c.z)));
     }
-    let mut scene = Scene::load(&args.file)?;
+    let mut scene = Scene::load_allowing(&args.file, args.view.model.allowed()?)?;
     let mut warnings = scene.warnings.clone();
     if scene.materials.iter().all(|m| m.skin.is_none()) {
         scene.materials.iter_mut().for_each(|m| m.skin = Some(Skin::default()));
@@ -181,10 +184,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let studio = Studio { args, scene: &scene, prepared, view, progress: &progress };
 
     std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
-    let all = Sheet::value_variants();
     let mut files = Vec::new();
-    for &sheet in if args.sheet.is_empty() { all } else { &args.sheet } {
-        let name = format!("{}.png", sheet.to_possible_value().expect("no sheet is hidden").get_name());
+    for &sheet in sheets {
+        let name = sheet_file(sheet);
         studio.sheet(sheet)?.write(&args.output.join(&name))?;
         files.push(name);
     }
@@ -251,6 +253,11 @@ fn approach(view: &mut View, scene: &RenderScene) {
     let middle = eye - depth * back + depth * tangent * (x * aspect * right + y * up);
     camera.transform.translation = (middle + SHARE * depth * back).into();
     view.middle = middle;
+}
+
+/// The name of a sheet's picture.
+fn sheet_file(sheet: Sheet) -> String {
+    format!("{}.png", sheet.to_possible_value().expect("no sheet is hidden").get_name())
 }
 
 /// Gives meshes without curvature some, as `kinran bake` would write it.

@@ -8,8 +8,10 @@ use kinran_render::reference::{
     Background, DetailShown, Film, RenderScene, Settings, SurfaceTextures, TextureFiltering, look_at, render,
 };
 use kinran_render::tonemap::{Tonemap, to_srgb8};
-use kinran_scene::{Camera, Environment, Light, LightKind, Scene};
+use kinran_scene::{Camera, Document, Environment, Light, LightKind, Scene};
 
+use crate::model::{ModelArgs, Place};
+use crate::outputs::refuse_input;
 use crate::skin::{SkinArgs, attach_skin};
 use crate::surfaces::fuzz_fits;
 use crate::values::{direction, number, size, vector};
@@ -81,11 +83,39 @@ pub struct ViewArgs {
 
     #[command(flatten)]
     #[allow(missing_docs)]
+    pub model: ModelArgs,
+
+    #[command(flatten)]
+    #[allow(missing_docs)]
     pub skin: SkinArgs,
 
     /// What is shown of maps that are blended from tiles
     #[arg(long, value_enum, default_value_t)]
     pub detail: DetailName,
+}
+
+impl ViewArgs {
+    /// Refuses pictures that would overwrite the model, a file that it names, or the environment. Other pictures are
+    /// written again without a question, as renderers do.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that names the picture.
+    pub(crate) fn refuse_inputs(
+        &self,
+        model: &Path,
+        outputs: impl IntoIterator<Item = PathBuf>,
+    ) -> Result<(), Error> {
+        let mut inputs = vec![model.to_path_buf()];
+        if let EnvironmentChoice::File(path) = &self.env {
+            inputs.push(path.clone());
+        }
+        if let Ok(Place::File(file)) = Place::of(model) {
+            // What is no glTF names no files, or is refused later.
+            inputs.extend(Document::open(&file).map(|document| document.files()).unwrap_or_default());
+            inputs.push(file);
+        }
+        outputs.into_iter().try_for_each(|output| refuse_input(&output, inputs.iter().map(PathBuf::as_path)))
+    }
 }
 
 /// What is shown of maps that are blended from tiles.

@@ -41,7 +41,7 @@ pub struct LoadedMaterial {
     pub occlusion: Option<(usize, usize)>,
     /// Metalness: which of `images`, and its channel.
     pub metallic: Option<(usize, usize)>,
-    /// What the texels told that the names did not; sentences, each about a named file.
+    /// What was assumed and may be wrong, from names and texels; a sentence each that names the material or the file.
     pub notes: Vec<String>,
 }
 
@@ -73,7 +73,7 @@ impl MaterialMaps {
             channel(&images, map)?;
         }
 
-        let mut notes = Vec::new();
+        let mut notes = self.warnings.clone();
         let surface = match &self.roughness {
             None => None,
             Some(source) => {
@@ -135,12 +135,9 @@ fn normal_map(
                  {correlation:.2})"
             ));
         }
-        (false, GreenSource::Assumed) => notes.push(match guess {
-            GreenGuess::Unsure => {
-                format!("{name}: assumed +Y; its slopes do not tell, say --y-down if it is DirectX")
-            }
-            _ => format!("{name}: assumed +Y, and its slopes agree"),
-        }),
+        (false, GreenSource::Assumed) if guess == GreenGuess::Unsure => {
+            notes.push(format!("{name}: assumed +Y; its slopes do not tell, say --y-down if it is DirectX"));
+        }
         (false, _) => {}
     }
     Ok(NormalMap::new(image.clone(), source.green == Green::Down))

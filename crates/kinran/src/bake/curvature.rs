@@ -1,7 +1,5 @@
 //! Curvature of a glTF file's meshes, as a vertex attribute.
 
-use std::path::Path;
-
 use clap::ValueEnum;
 use glam::{Vec3, Vec4};
 use kinran_bake::curvature::{
@@ -166,15 +164,16 @@ impl CurvatureReport {
 ///
 /// # Errors
 /// Where the copy cannot be written.
-pub(super) fn with_normals(input: &Path, args: &CurvatureArgs) -> Result<Option<tempfile::TempDir>, Error> {
-    if !args.estimate_normals {
+pub(super) fn with_normals(args: &super::Args) -> Result<Option<tempfile::TempDir>, Error> {
+    let (input, allowed) = (&args.input, args.model.allowed()?);
+    if !args.curvature.estimate_normals {
         return Ok(None);
     }
-    let scene = Scene::load(input)?;
+    let scene = Scene::load_allowing(input, allowed)?;
     if !scene.primitives.iter().any(|p| p.source.lacks_normals) {
         return Ok(None);
     }
-    let mut document = Document::open(input)?;
+    let mut document = Document::open_allowing(input, allowed)?;
     for mesh in meshes(&scene) {
         let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
         let surface = Joined::new(&group);
@@ -228,10 +227,47 @@ pub(super) fn mark_skin(
     Ok(())
 }
 
-/// Bakes curvature into the document's meshes.
+/// Refuses meshes that no curvature can be measured of, before anything is baked; gives the files of dumps.
 ///
 /// # Errors
-/// Where a mesh is none, or has no normals.
+/// Where there is no mesh, or one without normals.
+pub(super) fn check(args: &super::Args, scene: &Scene, document: &Document) -> Result<Vec<String>, Error> {
+    let flags = &args.curvature;
+    let mut wanted = meshes(scene);
+    wanted.retain(|mesh| mesh.iter().any(|&i| flags.wants(scene, &scene.primitives[i])));
+    if wanted.is_empty() && (!flags.skin.is_empty() || flags.curvature == Which::All) {
+        return Err(Error::Usage(format!(
+            "{}: no mesh to measure curvature of has triangles; export the mesh with its faces",
+            args.input.display()
+        )));
+    }
+    let mut dumps = Vec::new();
+    for mesh in wanted {
+        let name = mesh_name(document, scene.primitives[mesh[0]].source.mesh);
+        if let Some(flat) = mesh.iter().map(|&i| &scene.primitives[i].source).find(|s| s.lacks_normals) {
+            return Err(Error::Usage(format!(
+                "{}: {name}: primitive {} has no NORMAL, which glTF draws flat, and curvature needs smooth normals; \
+                 export them, or add --estimate-normals",
+                args.input.display(),
+                flat.primitive
+            )));
+        }
+        let Some(dump) = flags.curvature_dump.map(|format| dump_file(args, &name, format)) else { continue };
+        if dumps.iter().any(|known: &String| known.eq_ignore_ascii_case(&dump)) {
+            return Err(Error::Usage(format!(
+                "{}: two meshes would both be written to {dump}; give them names of their own",
+                args.input.display()
+            )));
+        }
+        dumps.push(dump);
+    }
+    Ok(dumps)
+}
+
+/// Bakes curvature into the document's meshes, which [`check`] has seen.
+///
+/// # Errors
+/// Where a mesh is none.
 pub(super) fn bake(
     args: &super::Args,
     console: &Console,
@@ -244,24 +280,11 @@ pub(super) fn bake(
     let mut reports = Vec::new();
     let groups: Vec<Vec<usize>> =
         meshes(scene).into_iter().filter(|mesh| mesh.iter().any(|&i| wanted(&scene.primitives[i]))).collect();
-    if groups.is_empty() && (!flags.skin.is_empty() || flags.curvature == Which::All) {
-        return Err(Error::Usage(format!(
-            "{}: no mesh to measure curvature of has triangles; export the mesh with its faces",
-            args.input.display()
-        )));
-    }
     let stage = console.progress().stage("curvature", groups.len() as u64);
     for mesh in groups {
         let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
         let name = mesh_name(document, group[0].source.mesh);
         let at_fault = |reason: String| Error::Usage(format!("{}: {name}: {reason}", args.input.display()));
-        if let Some(flat) = group.iter().find(|p| p.source.lacks_normals) {
-            return Err(at_fault(format!(
-                "primitive {} has no NORMAL, which glTF draws flat, and curvature needs smooth normals; export them, \
-                 or add --estimate-normals",
-                flat.source.primitive
-            )));
-        }
         let surface = Joined::new(&group);
         let millimetres = flags.unit_mm.map_or_else(|| unit(scene, &mesh, &name, warnings), f64::from);
         let options = Options {
@@ -429,6 +452,16 @@ fn put(
     Ok(())
 }
 
+/// The name of a dump's file.
+fn dump_file(args: &super::Args, mesh: &str, format: DumpFormat) -> String {
+    let stem = args.input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    let extension = match format {
+        DumpFormat::Json => "json",
+        DumpFormat::Exr => "exr",
+    };
+    format!("{stem}_{}_curvature.{extension}", file_stem(mesh))
+}
+
 /// Pixels in a row of an EXR dump.
 const DUMP_WIDTH: usize = 1024;
 
@@ -439,9 +472,7 @@ fn dump(
     baked: &Curvature,
     surface: &Joined,
 ) -> Result<(), Error> {
-    let stem = args.input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-    let path =
-        |extension: &str| args.output().join(format!("{stem}_{}_curvature.{extension}", file_stem(name)));
+    let path = args.output().join(dump_file(args, name, format));
     match format {
         DumpFormat::Exr => {
             let height = baked.tensors.len().div_ceil(DUMP_WIDTH);
@@ -450,7 +481,7 @@ fn dump(
             samples.resize(DUMP_WIDTH * height * 4, 0.0);
             let pixels = Pixels::F32(samples);
             let image = Image::new(DUMP_WIDTH as u32, height as u32, Channels::Rgba, pixels)?;
-            write_exr(&path("exr"), &image)?;
+            write_exr(&path, &image)?;
         }
         DumpFormat::Json => {
             let vertices: Vec<Value> = (baked.tensors.iter().enumerate())
@@ -478,7 +509,7 @@ fn dump(
                 "triangles": surface.triangles,
             });
             let text = serde_json::to_vec(&text).map_err(|e| Error::Internal(e.to_string()))?;
-            write_atomically(&path("json"), &text)?;
+            write_atomically(&path, &text)?;
         }
     }
     Ok(())

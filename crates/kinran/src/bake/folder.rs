@@ -1,13 +1,18 @@
 //! A folder of authored maps.
 
 use kinran_bake::aniso::{Sheet, SheetRequest, bake_surface};
-use kinran_bake::folder::{LoadedMaterial, Role as MapRole, scan};
+use kinran_bake::folder::{ASSUMED_ROUGHNESS, LoadedMaterial, MaterialMaps, Role as MapRole, scan};
 use kinran_bake::{bake_plain, pack_channels};
-use kinran_image::{Image, Role, Transfer, full_level_count, level_size};
+use kinran_image::{Image, Role, Transfer, full_level_count, image_size, level_size};
 use rayon::prelude::*;
 
 use super::report::hash_file;
-use super::{Args, Form, Input, Output, Report, SurfaceReport, file_name, file_stem, write_texture};
+use super::{
+    Args, Form, Input, Output, Report, SurfaceReport, file_name, file_stem, role_of, sheet_format,
+    texture_files, texture_space, write_texture,
+};
+use crate::content::Content;
+use crate::outputs::{Space, check_space, refuse_foreign};
 use crate::{Console, Error};
 
 /// Bakes a folder and tells what came of it.
@@ -29,8 +34,10 @@ pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
 /// # Errors
 /// See [`run`](super::run).
 pub fn bake_folder(args: &Args, console: &Console) -> Result<Vec<Report>, Error> {
+    let materials = scan(&args.input, &args.hints())?.materials;
+    check(args, console, &materials)?;
     let mut reports = Vec::new();
-    for maps in &scan(&args.input, &args.hints())?.materials {
+    for maps in &materials {
         let loaded = maps.load()?;
         for note in &loaded.notes {
             console.warn(note);
@@ -38,14 +45,88 @@ pub fn bake_folder(args: &Args, console: &Console) -> Result<Vec<Report>, Error>
         let mut report = Report::new(args);
         report.warnings.clone_from(&loaded.notes);
         report.surfaces.push(bake_material(args, console, &loaded)?);
-        report.write(&args.output().join(format!("{}.kinran.json", file_stem(&loaded.name))))?;
+        report.write(&args.output().join(report_file(&loaded.name)), Vec::new())?;
         reports.push(report);
     }
     Ok(reports)
 }
 
-fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> Result<SurfaceReport, Error> {
+/// Refuses what cannot be baked or written, before the first texture is.
+fn check(args: &Args, console: &Console, materials: &[MaterialMaps]) -> Result<(), Error> {
+    let (mut files, mut space) = (Vec::new(), Space::default());
+    for maps in materials {
+        let color = maps.color.as_deref().and_then(image_size);
+        let sizes = maps.files.iter().filter(|(role, _)| *role != MapRole::Color);
+        let sizes = sizes.filter_map(|(_, path)| image_size(path));
+        let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
+        for (sheet, content) in contents(args, maps) {
+            files.extend(texture_files(args, &format!("{}_{}", file_stem(&maps.name), content.name())));
+            let (role, format) = match sheet {
+                Some(sheet) => (role_of(sheet), sheet_format(args, sheet)),
+                None if content == Content::Color => (Role::Color, args.color_format),
+                None => (Role::Data, args.aniso_format),
+            };
+            let size = if content == Content::Color { color } else { size };
+            if let Some(size) = size {
+                space.add(texture_space(args, args.encoding(role, format).format, size));
+            }
+        }
+        files.push(report_file(&maps.name));
+    }
+    let mut names: Vec<String> = files.iter().map(|file| file.to_lowercase()).collect();
+    names.sort_unstable();
+    if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Error::Usage(format!(
+            "{}: two materials would both be written to {}; rename the files of one",
+            args.input.display(),
+            pair[0]
+        )));
+    }
+    refuse_foreign(args.output(), &files, args.force)?;
+    if let Some(warning) = check_space(args.output(), space)? {
+        console.warn(warning);
+    }
+    // A map that is none would be found out after hours of baking the materials before it.
+    if let [_, _, ..] = materials {
+        let stage = console.progress().stage("reading", materials.len() as u64);
+        for maps in materials {
+            maps.load()?;
+            stage.add(1);
+        }
+    }
+    Ok(())
+}
+
+/// What is written of a material, and of which sheet of its surface.
+fn contents(args: &Args, maps: &MaterialMaps) -> Vec<(Option<Sheet>, Content)> {
+    let packed = maps.occlusion.is_some() || maps.metallic.is_some();
+    let mut contents: Vec<(Option<Sheet>, Content)> = match (&maps.roughness, packed) {
+        (Some(_), _) => sheets(args, packed).into_iter().map(|(s, c)| (Some(s), c)).collect(),
+        (None, true) => vec![(None, Content::Orm)],
+        (None, false) => Vec::new(),
+    };
+    contents.extend(maps.color.as_ref().map(|_| (None, Content::Color)));
+    contents
+}
+
+/// The sheets of a surface, and what their textures are called; roughness may be packed with occlusion and metalness.
+fn sheets(args: &Args, packed: bool) -> Vec<(Sheet, Content)> {
     let form = args.form.unwrap_or(Form::Aniso);
+    let roughness = if packed { Content::Orm } else { Content::Roughness };
+    let sheets = [
+        (true, Sheet::Normal, Content::Normal),
+        (form.aniso(), Sheet::Aniso, Content::Aniso),
+        (form.khr() || packed, Sheet::Roughness, roughness),
+        (form.khr(), Sheet::KhrAnisotropy, Content::Anisotropy),
+    ];
+    sheets.into_iter().filter(|(wanted, ..)| *wanted).map(|(_, sheet, content)| (sheet, content)).collect()
+}
+
+fn report_file(material: &str) -> String {
+    format!("{}.kinran.json", file_stem(material))
+}
+
+fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> Result<SurfaceReport, Error> {
     let name = file_stem(&material.name);
     let mut report = SurfaceReport {
         name: material.name.clone(),
@@ -61,29 +142,20 @@ fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> R
         // One image that holds occlusion and metalness where glTF wants them is packed as it is.
         let packed = match (occlusion, metallic) {
             (None, None) => None,
-            _ => Some(pack_channels([occlusion, None, metallic, None], size, maps.wrap)?),
+            _ => {
+                let channels = [occlusion, None, metallic, None];
+                Some(pack_channels(channels, packed_without(args), size, maps.wrap)?)
+            }
         };
-        let mut requests = vec![SheetRequest {
-            sheet: Sheet::Normal,
-            encoding: args.encoding(Role::Normal, args.normal_format),
-            packed_with: None,
-        }];
-        let mut request = |sheet, role, packed_with| {
-            requests.push(SheetRequest {
+        let sheets = sheets(args, packed.is_some());
+        let requests: Vec<SheetRequest> = sheets
+            .iter()
+            .map(|&(sheet, _)| SheetRequest {
                 sheet,
-                encoding: args.encoding(role, args.aniso_format),
-                packed_with,
-            });
-        };
-        if form.aniso() {
-            request(Sheet::Aniso, Role::Aniso, None);
-        }
-        if form.khr() || packed.is_some() {
-            request(Sheet::Roughness, Role::Data, packed.as_ref());
-        }
-        if form.khr() {
-            request(Sheet::KhrAnisotropy, Role::Aniso, None);
-        }
+                encoding: args.encoding(role_of(sheet), sheet_format(args, sheet)),
+                packed_with: packed.as_ref().filter(|_| sheet == Sheet::Roughness),
+            })
+            .collect();
 
         let texels = (0..full_level_count(size.0, size.1))
             .map(|level| u64::from(level_size(size.0, level)) * u64::from(level_size(size.1, level)))
@@ -91,29 +163,34 @@ fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> R
         let stage = console.progress().stage(format!("{} {name}", args.filter.name()), texels);
         let baked = bake_surface(maps, args.options(), &requests, &|texels| stage.add(texels))?;
         report.levels = baked.levels;
-        let written: Vec<Vec<Output>> = (requests.par_iter().zip(baked.textures))
-            .map(|(request, texture)| {
-                let map = if request.packed_with.is_some() { "orm" } else { request.sheet.name() };
-                write_texture(args, &format!("{name}_{map}"), map, texture)
-            })
+        let written: Vec<Vec<Output>> = (sheets.par_iter().zip(baked.textures))
+            .map(|(&(_, map), texture)| write_texture(args, &format!("{name}_{}", map.name()), map, texture))
             .collect::<Result<_, Error>>()?;
         report.outputs.extend(written.into_iter().flatten());
     } else if occlusion.is_some() || metallic.is_some() {
         let size = |image: Option<(&Image, usize)>| image.map_or((1, 1), |(i, _)| (i.width, i.height));
         let (o, m) = (size(occlusion), size(metallic));
+        let channels = [occlusion, None, metallic, None];
         let packed =
-            pack_channels([occlusion, None, metallic, None], (o.0.max(m.0), o.1.max(m.1)), args.wrap())?;
+            pack_channels(channels, packed_without(args), (o.0.max(m.0), o.1.max(m.1)), args.wrap())?;
         let encoding = args.encoding(Role::Data, args.aniso_format);
         let texture = bake_plain(&packed, Transfer::Linear, encoding, args.options().kernel, args.wrap())?;
-        report.outputs.extend(write_texture(args, &format!("{name}_orm"), "orm", texture)?);
+        report.outputs.extend(write_texture(args, &format!("{name}_orm"), Content::Orm, texture)?);
     }
 
     if let Some(color) = material.images.iter().find(|map| map.role == MapRole::Color) {
         let encoding = args.encoding(Role::Color, args.color_format);
         let texture = bake_plain(&color.image, Transfer::Srgb, encoding, args.options().kernel, args.wrap())?;
-        report.outputs.extend(write_texture(args, &format!("{name}_color"), "color", texture)?);
+        report.outputs.extend(write_texture(args, &format!("{name}_color"), Content::Color, texture)?);
     }
     Ok(report)
+}
+
+/// Occlusion, roughness, metalness and alpha of a packed map where there is no map of them: open, as the flag says or is
+/// assumed, no metal, opaque.
+fn packed_without(args: &Args) -> [u8; 4] {
+    let roughness = args.roughness.unwrap_or(ASSUMED_ROUGHNESS);
+    [255, (roughness * 255.0).round() as u8, 0, 255]
 }
 
 fn inputs(material: &LoadedMaterial) -> Result<Vec<Input>, Error> {

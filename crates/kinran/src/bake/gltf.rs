@@ -8,12 +8,15 @@ use kinran_image::{
     Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Role, Texture, Transfer, full_level_count,
     level_size, write_png,
 };
-use kinran_scene::{Document, FUZZ_EXTENSION, Scene, Slot, TextureExtension, TextureRef};
+use kinran_scene::{Document, FUZZ_EXTENSION, Material, Scene, Slot, TextureExtension, TextureRef};
 use serde_json::Value;
 
 use super::{
-    Args, Form, Input, Output, Report, SurfaceReport, curvature, file_name, file_stem, write_texture,
+    Args, Form, Input, Output, Report, SurfaceReport, curvature, file_name, file_stem, role_of, sheet_format,
+    texture_files, texture_space, write_texture,
 };
+use crate::content::Content;
+use crate::outputs::{Space, WrittenFile, changed_files, check_space, refuse_foreign, relative};
 use crate::{Console, Error};
 
 /// Bakes a glTF file and tells what came of it.
@@ -45,18 +48,18 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
     let (_files, scene, mut document) = read(args)?;
     let mut report = Report::new(args);
     let surfaces = surfaces(args, &scene, &document, &mut report);
+    let stem = args.input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    let plan = Plan::new(args, &scene, &document, &surfaces, &stem);
+    let dumps = check(args, console, &scene, &document, &surfaces, &plan, &stem)?;
     std::fs::create_dir_all(args.output()).map_err(|e| kinran_image::Error::io(args.output(), e))?;
 
-    let stem = args.input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-    let mut names = Names::default();
-    for (_, materials, surface) in &surfaces {
-        let name = names.unique(&format!("{stem}_{}", file_stem(&scene.materials[materials[0]].name)));
-        let mut baker = SurfaceBaker { args, console, scene: &scene, document: &mut document, name };
-        report.surfaces.push(baker.bake(materials, surface)?);
+    let mut written = Vec::new();
+    for ((_, materials, surface), (name, planned)) in surfaces.iter().zip(&plan.surfaces) {
+        let (document, name, written) = (&mut document, name.clone(), &mut written);
+        let mut baker = SurfaceBaker { args, console, scene: &scene, document, name, written };
+        report.surfaces.push(baker.bake(materials, surface, planned)?);
     }
-    if args.all_textures {
-        bake_colors(args, &scene, &mut document, &mut names, &stem, &mut report)?;
-    }
+    bake_colors(args, &scene, &mut document, &plan.colors, &mut report)?;
     report.curvature = curvature::bake(args, console, &scene, &mut document, &mut report.warnings)?;
 
     for (i, material) in scene.materials.iter().enumerate().take(document.material_count()) {
@@ -68,19 +71,180 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
             document.use_extension("KHR_materials_sheen", false);
         }
     }
-    report.warnings.extend(document.write(&output)?);
-    report.write(&args.output().join(format!("{stem}.kinran.json")))?;
+    let packed = document.pack(&output)?;
+    packed.write()?;
+    report.warnings.extend(packed.warnings);
+    for dump in dumps {
+        written.push(WrittenFile::of(args.output(), dump)?);
+    }
+    let files = packed.files.iter();
+    written.extend(files.map(|(path, bytes)| WrittenFile::new(relative(args.output(), path), bytes)));
+    report.write(&args.output().join(format!("{stem}.kinran.json")), written)?;
     Ok(report)
+}
+
+/// The textures that will be baked, before any is.
+struct Plan {
+    /// What the files of each surface are called, and which they are.
+    surfaces: Vec<(String, Vec<Planned>)>,
+    colors: Vec<Colored>,
+}
+
+/// An image that needs no filter of its own.
+struct Colored {
+    /// What its files are called.
+    name: String,
+    place: TextureRef,
+    transfer: Transfer,
+    /// The materials that use it, and where.
+    slots: Vec<(usize, Slot)>,
+}
+
+impl Colored {
+    fn content(&self) -> Content {
+        match self.transfer {
+            Transfer::Srgb => Content::Color,
+            Transfer::Linear => Content::Data,
+        }
+    }
+
+    fn encoding(&self, args: &Args) -> Encoding {
+        let role = if self.transfer == Transfer::Srgb { Role::Color } else { Role::Data };
+        args.encoding(role, args.color_format)
+    }
+}
+
+impl Plan {
+    fn new(
+        args: &Args,
+        scene: &Scene,
+        document: &Document,
+        surfaces: &[(Key, Vec<usize>, MaterialSurface)],
+        stem: &str,
+    ) -> Self {
+        let mut names = Names::default();
+        let surfaces = surfaces.iter().map(|(_, materials, surface)| {
+            let material = &scene.materials[materials[0]];
+            (
+                names.unique(&format!("{stem}_{}", file_stem(&material.name))),
+                planned(scene, material, surface),
+            )
+        });
+        let surfaces = surfaces.collect();
+        let mut colors: Vec<Colored> = Vec::new();
+        let materials = document.material_count().min(scene.materials.len());
+        for material in (0..materials).filter(|_| args.all_textures) {
+            let m = &scene.materials[material];
+            let occlusion = m.occlusion.as_ref().filter(|_| !occlusion_is_packed(scene, material));
+            for (slot, place, transfer) in [
+                (Slot::BaseColor, m.base_color.as_ref(), Transfer::Srgb),
+                (Slot::Emissive, m.emissive.as_ref(), Transfer::Srgb),
+                (Slot::Occlusion, occlusion, Transfer::Linear),
+            ] {
+                let Some(place) = place.filter(|place| scene.images[place.image].is_some()) else { continue };
+                let known = colors.iter_mut().find(|c| c.place == *place && c.transfer == transfer);
+                match known {
+                    Some(known) => known.slots.push((material, slot)),
+                    None => {
+                        let mut color = Colored {
+                            name: String::new(),
+                            place: place.clone(),
+                            transfer,
+                            slots: vec![(material, slot)],
+                        };
+                        let image = file_stem(&document.image_name(place.image));
+                        color.name = names.unique(&format!("{stem}_{image}_{}", color.content().name()));
+                        colors.push(color);
+                    }
+                }
+            }
+        }
+        Plan { surfaces, colors }
+    }
+}
+
+/// The sheets of a material's surface.
+fn planned(scene: &Scene, m: &Material, surface: &MaterialSurface) -> Vec<Planned> {
+    let has_image = m.metallic_roughness.as_ref().is_some_and(|place| scene.images[place.image].is_some());
+    let directed = matches!(surface.maps.roughness, RoughnessMaps::Khr { .. });
+    // Factors are baked into the textures; an image that showed level 0 without them is replaced.
+    let mut planned = Vec::new();
+    if m.normal.is_some() {
+        planned.push(Planned { sheet: Sheet::Normal, slot: Slot::Normal, changed: m.normal_scale != 1.0 });
+    }
+    planned.push(Planned {
+        sheet: if directed { Sheet::Roughness } else { Sheet::IsotropicRoughness },
+        slot: Slot::MetallicRoughness,
+        changed: m.roughness_factor != 1.0 || !has_image,
+    });
+    if let Some(a) = m.anisotropy.as_ref().filter(|_| directed) {
+        planned.push(Planned {
+            sheet: Sheet::KhrAnisotropy,
+            slot: Slot::Anisotropy,
+            changed: a.strength != 1.0 || a.rotation != 0.0 || a.texture.is_none(),
+        });
+    }
+    planned
+}
+
+/// Refuses what cannot be baked or written, before the first texture is; gives the files of curvature's dumps.
+fn check(
+    args: &Args,
+    console: &Console,
+    scene: &Scene,
+    document: &Document,
+    surfaces: &[(Key, Vec<usize>, MaterialSurface)],
+    plan: &Plan,
+    stem: &str,
+) -> Result<Vec<String>, Error> {
+    let dumps = curvature::check(args, scene, document)?;
+    let (mut files, mut space) = (dumps.clone(), Space::default());
+    for ((name, planned), (.., surface)) in plan.surfaces.iter().zip(surfaces) {
+        let size = surface.maps.size();
+        let mut add = |sheet: Sheet| {
+            let name = format!("{name}_{}", Content::from(sheet).name());
+            files.extend(texture_files(args, &name));
+            let format = args.encoding(role_of(sheet), sheet_format(args, sheet)).format;
+            space.add(texture_space(args, format, size));
+            name
+        };
+        let replaced: Vec<String> =
+            planned.iter().filter_map(|p| Some(add(p.sheet)).filter(|_| p.changed)).collect();
+        if args.form.is_some_and(Form::aniso) {
+            add(Sheet::Aniso);
+        }
+        files.extend(replaced.into_iter().map(|name| format!("{name}.png")));
+    }
+    for color in &plan.colors {
+        files.extend(texture_files(args, &color.name));
+        if let Some(image) = &scene.images[color.place.image] {
+            space.add(texture_space(args, color.encoding(args).format, (image.width, image.height)));
+        }
+    }
+    for file in &files {
+        refuse_authored(document, &args.output().join(file))?;
+    }
+
+    // The model and what it takes along; what is there already is no loss.
+    let packed = document.pack(args.output().join(file_name(&args.input)))?;
+    space.most += packed.files.iter().map(|(_, bytes)| bytes.len() as u64).sum::<u64>();
+    files.extend(changed_files(args.output(), &packed));
+    files.push(format!("{stem}.kinran.json"));
+    refuse_foreign(args.output(), &files, args.force)?;
+    if let Some(warning) = check_space(args.output(), space)? {
+        console.warn(warning);
+    }
+    Ok(dumps)
 }
 
 /// The model as it is baked: its skin marked, its normals estimated where that was asked for. The document reads the
 /// files of the folder that comes with it when it needs them.
 fn read(args: &Args) -> Result<(Option<tempfile::TempDir>, Scene, Document), Error> {
-    let smoothed = curvature::with_normals(&args.input, &args.curvature)?;
+    let smoothed = curvature::with_normals(args)?;
     let input =
         smoothed.as_ref().map_or_else(|| args.input.clone(), |f| f.path().join(file_name(&args.input)));
-    let mut scene = Scene::load(&input)?;
-    let mut document = Document::open(&input)?;
+    let mut scene = Scene::load_allowing(&input, args.model.allowed()?)?;
+    let mut document = Document::open_allowing(&input, args.model.allowed()?)?;
     curvature::mark_skin(&args.curvature, &mut scene, &mut document)?;
     Ok((smoothed, scene, document))
 }
@@ -172,6 +336,8 @@ struct SurfaceBaker<'a> {
     scene: &'a Scene,
     document: &'a mut Document,
     name: String,
+    /// Files besides the textures.
+    written: &'a mut Vec<WrittenFile>,
 }
 
 /// A sheet, the slot it goes to, and whether the slot's image no longer shows level 0.
@@ -182,48 +348,25 @@ struct Planned {
 }
 
 impl SurfaceBaker<'_> {
-    fn bake(&mut self, materials: &[usize], surface: &MaterialSurface) -> Result<SurfaceReport, Error> {
+    fn bake(
+        &mut self,
+        materials: &[usize],
+        surface: &MaterialSurface,
+        planned: &[Planned],
+    ) -> Result<SurfaceReport, Error> {
         let args = self.args;
         let m = &self.scene.materials[materials[0]];
         let maps = &surface.maps;
         let size = maps.size();
         let mr = m.metallic_roughness.as_ref().and_then(|place| self.scene.images[place.image].clone());
-        let directed = matches!(maps.roughness, RoughnessMaps::Khr { .. });
-
-        // Factors are baked into the textures; an image that showed level 0 without them is replaced.
-        let mut planned = Vec::new();
-        if m.normal.is_some() {
-            planned.push(Planned {
-                sheet: Sheet::Normal,
-                slot: Slot::Normal,
-                changed: m.normal_scale != 1.0,
-            });
-        }
-        planned.push(Planned {
-            sheet: if directed { Sheet::Roughness } else { Sheet::IsotropicRoughness },
-            slot: Slot::MetallicRoughness,
-            changed: m.roughness_factor != 1.0 || mr.is_none(),
-        });
-        if let Some(a) = m.anisotropy.as_ref().filter(|_| directed) {
-            planned.push(Planned {
-                sheet: Sheet::KhrAnisotropy,
-                slot: Slot::Anisotropy,
-                changed: a.strength != 1.0 || a.rotation != 0.0 || a.texture.is_none(),
-            });
-        }
 
         let mut requests: Vec<SheetRequest> = planned
             .iter()
             .map(|planned| {
-                let (role, format) = match planned.sheet {
-                    Sheet::Normal => (Role::Normal, args.normal_format),
-                    Sheet::Roughness | Sheet::IsotropicRoughness => (Role::Data, args.aniso_format),
-                    Sheet::Aniso | Sheet::KhrAnisotropy => (Role::Aniso, args.aniso_format),
-                };
                 let is_roughness = planned.slot == Slot::MetallicRoughness;
                 SheetRequest {
                     sheet: planned.sheet,
-                    encoding: args.encoding(role, format),
+                    encoding: args.encoding(role_of(planned.sheet), sheet_format(args, planned.sheet)),
                     packed_with: mr.as_deref().filter(|_| is_roughness),
                 }
             })
@@ -264,7 +407,7 @@ impl SurfaceBaker<'_> {
             report.outputs.extend(self.place(planned, texture, image, materials, &surface.place)?);
         }
         if let Some(aniso) = aniso {
-            let outputs = write_texture(args, &format!("{}_aniso", self.name), "aniso", aniso)?;
+            let outputs = write_texture(args, &format!("{}_aniso", self.name), Content::Aniso, aniso)?;
             self.place_aniso(&outputs, materials);
             report.outputs.extend(outputs);
         }
@@ -280,17 +423,16 @@ impl SurfaceBaker<'_> {
         materials: &[usize],
         place: &TextureRef,
     ) -> Result<Vec<Output>, Error> {
-        let map = planned.sheet.name();
-        let name = format!("{}_{map}", self.name);
+        let map = Content::from(planned.sheet);
+        let name = format!("{}_{}", self.name, map.name());
         let outputs = write_texture(self.args, &name, map, texture)?;
 
         let old = self.document.texture(materials[0], planned.slot);
         let source = match fallback {
             Some(level_0) => {
                 let file = format!("{name}.png");
-                let path = self.args.output().join(&file);
-                refuse_authored(self.document, &path)?;
-                write_png(&path, &image_of(&level_0)?)?;
+                write_png(&self.args.output().join(&file), &image_of(&level_0)?)?;
+                self.written.push(WrittenFile::of(self.args.output(), &file)?);
                 Some(self.document.add_image_file(&file))
             }
             None => old.and_then(|texture| self.document.texture_image(texture)),
@@ -439,48 +581,27 @@ fn bake_colors(
     args: &Args,
     scene: &Scene,
     document: &mut Document,
-    names: &mut Names,
-    stem: &str,
+    colors: &[Colored],
     report: &mut Report,
 ) -> Result<(), Error> {
-    let mut baked: Vec<(TextureRef, Transfer, usize)> = Vec::new();
-    for material in 0..document.material_count().min(scene.materials.len()) {
-        let m = &scene.materials[material];
-        let occlusion = m.occlusion.as_ref().filter(|_| !occlusion_is_packed(scene, material));
-        for (slot, place, transfer) in [
-            (Slot::BaseColor, m.base_color.as_ref(), Transfer::Srgb),
-            (Slot::Emissive, m.emissive.as_ref(), Transfer::Srgb),
-            (Slot::Occlusion, occlusion, Transfer::Linear),
-        ] {
-            let Some(place) = place else { continue };
-            let known = baked.iter().find(|(p, t, _)| p == place && *t == transfer);
-            let texture = match known {
-                Some((.., texture)) => *texture,
-                None => {
-                    let Some(image) = &scene.images[place.image] else { continue };
-                    let (role, map) = match transfer {
-                        Transfer::Srgb => (Role::Color, "color"),
-                        Transfer::Linear => (Role::Data, "data"),
-                    };
-                    let name = names
-                        .unique(&format!("{stem}_{}_{map}", file_stem(&document.image_name(place.image))));
-                    let encoding = args.encoding(role, args.color_format);
-                    let texture = bake_plain(image, transfer, encoding, args.options().kernel, place.wrap)?;
-                    let outputs = write_texture(args, &name, map, texture)?;
-                    let old = document.texture(material, slot);
-                    let source = old.and_then(|texture| document.texture_image(texture));
-                    let alternatives = alternatives(document, &outputs);
-                    let texture = document.add_texture(old, source, &alternatives);
-                    report.surfaces.push(SurfaceReport {
-                        name,
-                        inputs: vec![input(document, place.image, map, image)?],
-                        outputs,
-                        levels: Vec::new(),
-                    });
-                    baked.push((place.clone(), transfer, texture));
-                    texture
-                }
-            };
+    for color in colors {
+        let (place, content) = (&color.place, color.content());
+        let Some(image) = &scene.images[place.image] else { continue };
+        let kernel = args.options().kernel;
+        let texture = bake_plain(image, color.transfer, color.encoding(args), kernel, place.wrap)?;
+        let outputs = write_texture(args, &color.name, content, texture)?;
+        let (material, slot) = color.slots[0];
+        let old = document.texture(material, slot);
+        let source = old.and_then(|texture| document.texture_image(texture));
+        let alternatives = alternatives(document, &outputs);
+        let texture = document.add_texture(old, source, &alternatives);
+        report.surfaces.push(SurfaceReport {
+            name: color.name.clone(),
+            inputs: vec![input(document, place.image, content.name(), image)?],
+            outputs,
+            levels: Vec::new(),
+        });
+        for &(material, slot) in &color.slots {
             document.set_texture(material, slot, texture);
         }
     }

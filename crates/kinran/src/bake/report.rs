@@ -7,6 +7,8 @@ use kinran_image::{Format, Texture, Transfer, write_atomically};
 use serde::Serialize;
 
 use crate::Error;
+use crate::content::Content;
+use crate::outputs::WrittenFile;
 
 /// A file that went in.
 #[derive(Clone, Debug, Serialize)]
@@ -29,7 +31,7 @@ pub struct Output {
     /// Its name, beside the report.
     pub file: String,
     /// What it holds.
-    pub map: String,
+    pub map: Content,
     /// Its texel format.
     pub format: String,
     /// `linear` or `srgb`.
@@ -47,7 +49,7 @@ pub struct Output {
 }
 
 impl Output {
-    pub(super) fn new(file: String, map: &str, texture: &Texture, bytes: &[u8]) -> Self {
+    pub(super) fn new(file: String, map: Content, texture: &Texture, bytes: &[u8]) -> Self {
         let format = match texture.format {
             Format::Bc1 => "bc1",
             Format::Bc4 => "bc4",
@@ -58,7 +60,7 @@ impl Output {
         };
         Output {
             file,
-            map: map.into(),
+            map,
             format: format.into(),
             transfer: if texture.transfer == Transfer::Srgb { "srgb" } else { "linear" },
             width: texture.levels[0].width,
@@ -99,6 +101,8 @@ pub struct Report {
     pub curvature: Vec<super::CurvatureReport>,
     /// What was left out or assumed, a sentence each.
     pub warnings: Vec<String>,
+    /// Every file that was written beside this report: a later run writes these again, and no others, without a question.
+    pub written: Vec<WrittenFile>,
 }
 
 impl Report {
@@ -110,10 +114,16 @@ impl Report {
             surfaces: Vec::new(),
             curvature: Vec::new(),
             warnings: Vec::new(),
+            written: Vec::new(),
         }
     }
 
-    pub(super) fn write(&self, path: &Path) -> Result<(), Error> {
+    /// Writes the report; `others` are the files that were written besides the textures.
+    pub(super) fn write(&mut self, path: &Path, others: Vec<WrittenFile>) -> Result<(), Error> {
+        let textures = self.surfaces.iter().flat_map(|s| &s.outputs);
+        let textures =
+            textures.map(|o| WrittenFile { file: o.file.clone(), bytes: o.bytes, blake3: o.blake3.clone() });
+        self.written = textures.chain(others).collect();
         let mut text = serde_json::to_string_pretty(self).map_err(|e| Error::Internal(e.to_string()))?;
         text.push('\n');
         Ok(write_atomically(path, text.as_bytes())?)

@@ -12,7 +12,7 @@ use crate::detail::{BlockFormat, SolveArgs, default_format};
 use crate::skin_lut;
 
 /// Flags that say what a run does, not how an entry is baked.
-const OF_THE_RUN: [&str; 7] = ["output", "watch", "jobs", "prune", "cache", "dry-run", "help"];
+const OF_THE_RUN: [&str; 8] = ["output", "watch", "jobs", "prune", "cache", "dry-run", "force", "help"];
 
 #[derive(Parser)]
 #[command(name = "bake", no_binary_name = true)]
@@ -121,6 +121,7 @@ pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestErr
             layer.mask = layer.mask.as_ref().map(|mask| manifest.beside(mask));
         }
         args.model = args.model.as_ref().map(|model| manifest.beside(model));
+        args.trust.allow_outside.iter_mut().for_each(|folder| *folder = manifest.beside(&*folder));
         return Ok(Flags::Detail(Box::new(args)));
     }
     if job.kind == Kind::Skin {
@@ -133,6 +134,7 @@ pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestErr
     }
     let mut args = BakeFlags::try_parse_from(all).map_err(wrong)?.args;
     super::check_formats(&args).map_err(|e| manifest.error(&job.place, e.to_string()))?;
+    args.model.allow_outside.iter_mut().for_each(|folder| *folder = manifest.beside(&*folder));
     for path in args.map.iter_mut().map(|(_, path)| path).chain(&mut args.ignore) {
         if !job.input.join(&path).exists() {
             *path = manifest.beside(&*path);

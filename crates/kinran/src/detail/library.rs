@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{BlockFormat, KindName, page};
-use crate::outputs::check_folder;
+use crate::outputs::{check_folder, refuse_other_page};
 use crate::table::table;
 use crate::{Console, Error};
 
@@ -192,6 +192,7 @@ pub struct LibraryReport {
 
 pub(super) fn run(args: &LibraryArgs, console: &Console) -> Result<(), Error> {
     check_folder(&args.output)?;
+    refuse_other_page(&args.output.join("index.html"))?;
     let report = report_library(args, console)?;
     console.result(&report, &text(&report))
 }

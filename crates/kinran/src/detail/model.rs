@@ -6,14 +6,14 @@ use glam::vec3;
 use kinran_bake::detail::{MapKind, Target};
 use kinran_image::{encode_png, write_atomically};
 use kinran_scene::{
-    DETAIL_EXTENSION, Detail, DetailLayer, DetailMap, DetailMask, Document, LayerTransform, Object, Slot,
-    TextureExtension, TextureRef, Wrap,
+    DETAIL_EXTENSION, Detail, DetailLayer, DetailMap, DetailMask, Document, LayerTransform, Object, Packed,
+    Slot, TextureExtension, TextureRef, Wrap,
 };
 use serde_json::{Value, json};
 
 use super::{LayerFlag, SolveArgs};
 use crate::demo::glb::container;
-use crate::outputs::has_extension;
+use crate::outputs::{has_extension, relative};
 use crate::{Error, values};
 
 /// What each channel of a data target is, from `--channels`.
@@ -26,9 +26,9 @@ pub(crate) fn channels_flag(text: &str) -> Result<String, String> {
     Err("write a letter for each channel: o occlusion, r roughness, m metallic, - none; such as orm, -rm or r".into())
 }
 
-/// Refuses models that cannot be written, before anything is solved.
-pub(super) fn check(args: &SolveArgs) -> Result<(), Error> {
-    let Some(model) = &args.model else { return Ok(()) };
+/// Refuses models that cannot be written, before anything is solved; gives what it takes along.
+pub(super) fn check(args: &SolveArgs) -> Result<Option<Packed>, Error> {
+    let Some(model) = &args.model else { return Ok(None) };
     let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
     if same(&output(args, model), model) {
         return Err(Error::Usage(format!(
@@ -36,7 +36,9 @@ pub(super) fn check(args: &SolveArgs) -> Result<(), Error> {
             model.display()
         )));
     }
-    find_material(&Document::open(model)?, args).map(drop)
+    let document = Document::open_allowing(model, args.trust.allowed()?)?;
+    find_material(&document, args)?;
+    Ok(Some(document.pack(output(args, model))?))
 }
 
 /// Textures that were written, each by the names of its files.
@@ -59,7 +61,7 @@ pub(super) fn write(
     written: &Written,
 ) -> Result<Vec<String>, Error> {
     let (mut document, path) = match &args.model {
-        Some(model) => (Document::open(model)?, output(args, model)),
+        Some(model) => (Document::open_allowing(model, args.trust.allowed()?)?, output(args, model)),
         None => {
             let size = (target.levels[0].width, target.levels[0].height);
             let board = board(stem, MapKind::from(args.kind), size);
@@ -89,8 +91,9 @@ pub(super) fn write(
     if let Some(property) = property.as_object_mut() {
         property.extend(info);
     }
-    document.write(&path)?;
-    files.push(path.file_name().unwrap_or_default().to_string_lossy().into_owned());
+    let packed = document.pack(&path)?;
+    packed.write()?;
+    files.extend(packed.files.iter().map(|(path, _)| relative(&args.output, path)));
     Ok(files)
 }
 

@@ -1,6 +1,6 @@
 //! `kinran detail solve`: one target against its layers.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use glam::vec3;
@@ -15,7 +15,9 @@ use super::layer_flag::layer_flag;
 use super::model::{self, Written, channels_flag};
 use super::{BlockFormat, KindName, LayerFlag, default_format};
 use crate::bake::{Container, PresetName};
-use crate::outputs::{check_folder, has_extension};
+use crate::content::Content;
+use crate::model::ModelArgs;
+use crate::outputs::{WrittenFile, changed_files, check_folder, has_extension, refuse_foreign, refuse_input};
 use crate::table::table;
 use crate::values::number;
 use crate::{Console, Error};
@@ -121,6 +123,10 @@ pub struct SolveArgs {
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
 
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub trust: ModelArgs,
+
     /// The material of --model; needed where it has several
     #[arg(long, value_name = "NAME", requires = "model")]
     pub material: Option<String>,
@@ -129,6 +135,10 @@ pub struct SolveArgs {
     /// [default: orm, of grey maps r]
     #[arg(long, value_name = "LETTERS", value_parser = channels_flag)]
     pub channels: Option<String>,
+
+    /// Overwrites files that kinran did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
 
     /// File format of the textures
     #[arg(long, value_enum, default_value_t)]
@@ -146,6 +156,8 @@ pub struct SolveReport {
     pub target: String,
     /// Files written.
     pub files: Vec<String>,
+    /// The same with their hashes: a later run writes these again, and no others, without a question.
+    pub written: Vec<WrittenFile>,
     /// Width and height of the target and of `s`.
     pub target_size: [u32; 2],
     /// Width and height of `s`.
@@ -169,15 +181,60 @@ pub(super) fn run(args: &SolveArgs, console: &Console) -> Result<(), Error> {
     console.result(&report, &text(&report))
 }
 
-/// A tile or mask by its file and how it is to be taken, each read and compressed once.
-type Tiles = BTreeMap<(PathBuf, bool, bool), Tile>;
+/// A tile or mask: its file, whether its green grows downwards, and whether it is a mask.
+type TileKey = (PathBuf, bool, bool);
+
+/// Tiles and masks, each read and compressed once.
+type Tiles = BTreeMap<TileKey, Tile>;
+
+/// Refuses what cannot be written, before anything is read.
+fn check(args: &SolveArgs) -> Result<(), Error> {
+    let packed = model::check(args)?;
+    let keys: BTreeSet<TileKey> = (args.layer.iter())
+        .flat_map(|flag| {
+            let mask = flag.mask.iter().map(|mask| (mask.clone(), false, true));
+            mask.chain([(flag.tile.clone(), flag.y_down, false)])
+        })
+        .collect();
+    let stem = file_stem(&args.target);
+    let mut files = texture_files(args, &format!("{stem}_synthesized"));
+    for key in keys.iter().filter(|key| writes_tile(args, key)) {
+        files.extend(texture_files(args, &tile_name(key, || keys.iter())));
+    }
+    if args.board || args.model.is_some() {
+        files.push(format!("{stem}_authored.png"));
+    }
+    if args.board {
+        files.push(format!("{stem}.glb"));
+    }
+    files.extend(packed.iter().flat_map(|packed| changed_files(&args.output, packed)));
+    if args.pictures {
+        files.extend(PICTURES.map(|picture| format!("{stem}_{picture}.png")));
+    }
+    for file in &files {
+        let inputs = std::iter::once(&args.target).chain(keys.iter().map(|key| &key.0));
+        refuse_input(&args.output.join(file), inputs.map(PathBuf::as_path))?;
+    }
+    files.push(format!("{stem}.detail.json"));
+    refuse_foreign(&args.output, &files, args.force)
+}
+
+/// Whether a tile is written: a model finds its tiles beside it, also those that were baked before.
+fn writes_tile(args: &SolveArgs, key: &TileKey) -> bool {
+    let baked = has_extension(&key.0, "ktx2") || has_extension(&key.0, "dds");
+    !baked || args.board || args.model.is_some()
+}
+
+/// What `--pictures` shows.
+const PICTURES: [&str; 7] =
+    ["detail", "synthesized", "blended", "target", "compressed_target", "error", "target_error"];
 
 /// Reads, solves and writes.
 ///
 /// # Errors
 /// Whatever is wrong with a file or a flag; each names the file.
 pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, Error> {
-    model::check(args)?;
+    check(args)?;
     let kind = MapKind::from(args.kind);
     let format = args.format.unwrap_or_else(|| default_format(kind));
     let mut options = DetailOptions::new(format.encoding());
@@ -192,6 +249,9 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         options.blend = kinran_bake::detail::Blend::Plain;
     }
 
+    // First, since compressing tiles takes a while.
+    let target =
+        named(&args.target, read_image(&args.target).and_then(|i| Target::new(&i, kind, args.y_down)))?;
     let tiles = read_tiles(args, kind, args.tile_format.unwrap_or(format), console)?;
     let tile = |file: &Path, y_down: bool, is_mask: bool| &tiles[&(file.to_path_buf(), y_down, is_mask)];
     let mut layers: Vec<Layer> = args
@@ -214,8 +274,6 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
             }),
         })
         .collect();
-    let target =
-        named(&args.target, read_image(&args.target).and_then(|i| Target::new(&i, kind, args.y_down)))?;
     let size = (target.levels[0].width, target.levels[0].height);
     let texels = u64::from(size.0) * u64::from(size.1);
 
@@ -262,7 +320,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     let mut files = write_textures(args, &stem, &solved, &tiles)?;
     if args.board || args.model.is_some() {
         let texture = |file: &Path, y_down: bool, is_mask: bool| {
-            texture_files(args, &tile_name(&(file.to_path_buf(), y_down, is_mask), &tiles))
+            texture_files(args, &tile_name(&(file.to_path_buf(), y_down, is_mask), || tiles.keys()))
         };
         let written = Written {
             synthesized: &texture_files(args, &format!("{stem}_synthesized")),
@@ -274,25 +332,27 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     }
     if args.pictures {
         let pictures = level_pictures(&target, &layers, &options, &solved, 0)?;
-        let named: [(&str, &Image); 7] = [
-            ("detail", &pictures.detail),
-            ("synthesized", &pictures.synthesized),
-            ("blended", &pictures.blended),
-            ("target", &pictures.target),
-            ("compressed_target", &pictures.compressed_target),
-            ("error", &pictures.error),
-            ("target_error", &pictures.target_error),
+        let images: [&Image; 7] = [
+            &pictures.detail,
+            &pictures.synthesized,
+            &pictures.blended,
+            &pictures.target,
+            &pictures.compressed_target,
+            &pictures.error,
+            &pictures.target_error,
         ];
-        for (name, image) in named {
+        for (name, image) in PICTURES.into_iter().zip(images) {
             let file = format!("{stem}_{name}.png");
             write_atomically(&args.output.join(&file), &encode_png(image)?)?;
             files.push(file);
         }
     }
     let first = &solved.texture.levels[0];
+    let written = files.iter().map(|file| WrittenFile::of(&args.output, file)).collect::<Result<_, _>>()?;
     let report = SolveReport {
         target: file_name(&args.target),
         files,
+        written,
         target_size: [size.0, size.1],
         size: [first.width, first.height],
         opacity,
@@ -361,9 +421,9 @@ fn write_textures(
 ) -> Result<Vec<String>, Error> {
     std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
     let mut files = Vec::new();
-    let mut write = |name: String, texture: &kinran_image::Texture, map: &str| -> Result<(), Error> {
+    let mut write = |name: String, texture: &kinran_image::Texture, map: Content| -> Result<(), Error> {
         let mut texture = texture.clone();
-        texture.metadata.insert("KinranMap".into(), map.into());
+        map.mark(&mut texture);
         for extension in args.container.extensions() {
             let file = format!("{name}.{extension}");
             let bytes = match *extension {
@@ -375,12 +435,14 @@ fn write_textures(
         }
         Ok(())
     };
-    write(format!("{stem}_synthesized"), &solved.texture, "synthesized")?;
+    write(format!("{stem}_synthesized"), &solved.texture, Content::Synthesized)?;
     for (key, tile) in tiles {
-        // A model finds its tiles beside it, also those that were baked before.
-        let baked = has_extension(&key.0, "ktx2") || has_extension(&key.0, "dds");
-        if !baked || args.board || args.model.is_some() {
-            write(tile_name(key, tiles), &tile.texture, if key.2 { "mask" } else { "detail" })?;
+        if writes_tile(args, key) {
+            write(
+                tile_name(key, || tiles.keys()),
+                &tile.texture,
+                if key.2 { Content::Mask } else { Content::Detail },
+            )?;
         }
     }
     Ok(files)
@@ -392,12 +454,12 @@ fn texture_files(args: &SolveArgs, name: &str) -> Vec<String> {
 }
 
 /// Name of a tile's or mask's texture: the image's, after its folder's where others are called so too.
-fn tile_name(key: &(PathBuf, bool, bool), tiles: &Tiles) -> String {
-    let name = |(file, y_down, is_mask): &(PathBuf, bool, bool)| {
+fn tile_name<'a, K: Iterator<Item = &'a TileKey>>(key: &TileKey, all: impl Fn() -> K) -> String {
+    let name = |(file, y_down, is_mask): &TileKey| {
         file_stem(file) + if *y_down { "_y_down" } else { "" } + if *is_mask { "_mask" } else { "" }
     };
     let mine = name(key);
-    let alone = tiles.keys().filter(|other| name(other) == mine).count() == 1;
+    let alone = all().filter(|other| name(other) == mine).count() == 1;
     match key.0.parent().and_then(Path::file_name) {
         Some(folder) if !alone => format!("{}_{mine}", folder.to_string_lossy()),
         _ => mine,

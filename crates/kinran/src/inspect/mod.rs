@@ -1,28 +1,30 @@
-//! `kinran inspect`: what is inside a texture, a model or an image.
+//! `kinran inspect`: what is inside a texture, a model, an image or a report.
 
 mod image;
 mod model;
+mod report;
 mod statistics;
 mod texture;
 
 use std::path::PathBuf;
 
-use clap::ValueEnum;
-use serde::Serialize;
-
+use crate::content::Content;
+use crate::model::ModelArgs;
 use crate::{Console, Error, outputs};
 
-/// Tells what is in a texture, a model or an image
+/// Tells what is in a texture, a model, an image or a report
 ///
 /// .ktx2 and .dds: format, transfer function, size, key/values, and statistics of every level that suit
 /// what the map holds. .glb and .gltf: geometry, materials, what `kinran bake` would do with them,
 /// extensions, warnings. .png, .jpg, .tga, .tif, .hdr and .exr: size, channels, ranges, and whether what
-/// looks like a normal map is one.
+/// looks like a normal map is one. .json: what a report of `kinran` says, and whether the files that it names are as
+/// they were written.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran inspect brushed_aniso.ktx2
   kinran inspect brushed_normal.dds --role normal
-  kinran inspect lamp.glb --json")]
+  kinran inspect lamp.glb --json
+  kinran inspect baked/lamp.kinran.json")]
 pub struct Args {
     /// The file
     #[arg(value_name = "FILE")]
@@ -31,25 +33,11 @@ pub struct Args {
     /// What a texture holds; by default what its key KinranMap says, or else what its format suggests:
     /// BC5 normals, sRGB colour, anything else data
     #[arg(long, value_enum, value_name = "MAP")]
-    pub role: Option<MapRole>,
-}
+    pub role: Option<Content>,
 
-/// What a baked texture holds; its key `KinranMap` has one of these names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum MapRole {
-    /// Tangent-space normals, RG.
-    Normal,
-    /// Kinran's aniso map.
-    Aniso,
-    /// Perceptual roughness in G.
-    Roughness,
-    /// `KHR_materials_anisotropy`: RG direction, B strength.
-    Anisotropy,
-    /// Colour.
-    Color,
-    /// Masks.
-    Data,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub model: ModelArgs,
 }
 
 /// Extensions of image files that are read.
@@ -68,27 +56,20 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         return Err(Error::Usage(format!(
             "{}: --role {}: only textures have a role; leave the flag out",
             args.file.display(),
-            role.to_possible_value().expect("no role is hidden").get_name()
+            role.name()
         )));
     }
     if is(&["glb", "gltf"]) {
-        model::inspect(&args.file, console)
+        model::inspect(&args.file, args.model.allowed()?, console)
     } else if is(&IMAGES) {
         image::inspect(&args.file, console)
+    } else if is(&["json"]) {
+        report::inspect(&args.file, console)
     } else {
         Err(Error::Usage(format!(
-            "{}: this kind of file is not known; give a .ktx2, .dds, .glb, .gltf or an image (.{})",
+            "{}: this kind of file is not known; give a .ktx2, .dds, .glb, .gltf, a report of kinran (.json) or an image (.{})",
             args.file.display(),
             IMAGES.join(", .")
         )))
-    }
-}
-
-/// Bytes as people read them.
-fn bytes_text(bytes: u64) -> String {
-    match bytes {
-        0..1_024 => format!("{bytes} B"),
-        1_024..1_048_576 => format!("{:.1} KiB", bytes as f64 / 1_024.0),
-        _ => format!("{:.1} MiB", bytes as f64 / 1_048_576.0),
     }
 }

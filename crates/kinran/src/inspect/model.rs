@@ -1,6 +1,6 @@
 //! What is inside a glTF file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use kinran_bake::aniso::RoughnessMaps;
 use kinran_bake::{NoSurface, material_surface};
@@ -63,9 +63,9 @@ struct CameraReport {
     yfov_degrees: f32,
 }
 
-pub(super) fn inspect(path: &Path, console: &Console) -> Result<(), Error> {
-    let document = Document::open(path)?;
-    let scene = Scene::load(path)?;
+pub(super) fn inspect(path: &Path, allowed: &[PathBuf], console: &Console) -> Result<(), Error> {
+    let document = Document::open_allowing(path, allowed)?;
+    let scene = Scene::load_allowing(path, allowed)?;
     let strings = |key: &str| -> Vec<String> {
         let values = document.json().get(key).and_then(|v| v.as_array());
         values.into_iter().flatten().filter_map(|v| v.as_str().map(str::to_owned)).collect()

@@ -4,7 +4,7 @@ use glam::{Vec3, Vec4, vec3};
 use kinran_shading::{aniso_decode_matrix, normal_from_xy};
 use serde::Serialize;
 
-use super::MapRole;
+use crate::content::Content;
 
 /// The smallest, the average and the largest value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -66,10 +66,10 @@ pub(crate) enum Statistics {
 
 impl Statistics {
     /// Statistics of decoded texels; `None` of none.
-    pub(crate) fn new(role: MapRole, texels: &[[f32; 4]]) -> Option<Statistics> {
+    pub(crate) fn new(role: Content, texels: &[[f32; 4]]) -> Option<Statistics> {
         let channel = |i: usize| Range::of(texels.iter().map(move |t| t[i]));
         Some(match role {
-            MapRole::Normal => {
+            Content::Normal => {
                 let normals = || texels.iter().map(|t| (Vec4::from(*t) * 2.0 - 1.0).truncate());
                 let unit = || normals().map(|n| normal_from_xy(n.x, n.y));
                 let sum = unit().fold(glam::DVec3::ZERO, |sum, n| sum + n.as_dvec3());
@@ -82,7 +82,7 @@ impl Statistics {
                     outside_share: outside as f32 / texels.len() as f32,
                 }
             }
-            MapRole::Aniso => {
+            Content::Aniso => {
                 let eigen = || texels.iter().map(|t| aniso_decode_matrix(vec3(t[0], t[1], t[2])).eigen());
                 Statistics::Aniso {
                     alpha_t: Range::of(eigen().map(|(t, _, _)| t.sqrt()))?,
@@ -92,14 +92,14 @@ impl Statistics {
                     ),
                 }
             }
-            MapRole::Roughness => Statistics::Roughness { roughness: channel(1)? },
-            MapRole::Anisotropy => Statistics::Anisotropy {
+            Content::Roughness => Statistics::Roughness { roughness: channel(1)? },
+            Content::Anisotropy => Statistics::Anisotropy {
                 strength: channel(2)?,
                 direction_spread_degrees: direction_spread(
                     texels.iter().map(|t| ([t[0] * 2.0 - 1.0, t[1] * 2.0 - 1.0], t[2])),
                 ),
             },
-            MapRole::Color | MapRole::Data => Statistics::Channels {
+            _ => Statistics::Channels {
                 red: channel(0)?,
                 green: channel(1)?,
                 blue: channel(2)?,
@@ -109,15 +109,15 @@ impl Statistics {
     }
 
     /// Headings of [`Statistics::cells`].
-    pub(crate) fn headings(role: MapRole) -> Vec<&'static str> {
-        match role {
-            MapRole::Normal => vec!["length", "tilt min", "mean", "max deg", "outside %"],
-            MapRole::Aniso => {
-                vec!["alpha_t min", "mean", "max", "alpha_b min", "mean", "max", "spread deg"]
+    pub(crate) fn headings(&self) -> &'static [&'static str] {
+        match self {
+            Statistics::Normal { .. } => &["length", "tilt min", "mean", "max deg", "outside %"],
+            Statistics::Aniso { .. } => {
+                &["alpha_t min", "mean", "max", "alpha_b min", "mean", "max", "spread deg"]
             }
-            MapRole::Roughness => vec!["roughness min", "mean", "max"],
-            MapRole::Anisotropy => vec!["strength min", "mean", "max", "spread deg"],
-            MapRole::Color | MapRole::Data => vec![
+            Statistics::Roughness { .. } => &["roughness min", "mean", "max"],
+            Statistics::Anisotropy { .. } => &["strength min", "mean", "max", "spread deg"],
+            Statistics::Channels { .. } => &[
                 "red min",
                 "mean",
                 "max",
@@ -195,7 +195,7 @@ mod tests {
     fn opposite_directions_are_parallel_and_crossed_ones_are_not() {
         let spread = |degrees: &[f32]| {
             let texels: Vec<_> = degrees.iter().map(|&d| aniso(0.5, 0.1, d)).collect();
-            match Statistics::new(MapRole::Aniso, &texels) {
+            match Statistics::new(Content::Aniso, &texels) {
                 Some(Statistics::Aniso { direction_spread_degrees, .. }) => direction_spread_degrees.unwrap(),
                 other => panic!("{other:?}"),
             }
@@ -210,7 +210,7 @@ mod tests {
     #[test]
     fn roughness_is_read_back_as_it_was_encoded() {
         let texels = [aniso(0.5, 0.1, 10.0), aniso(0.3, 0.2, 70.0)];
-        let Some(Statistics::Aniso { alpha_t, alpha_b, .. }) = Statistics::new(MapRole::Aniso, &texels)
+        let Some(Statistics::Aniso { alpha_t, alpha_b, .. }) = Statistics::new(Content::Aniso, &texels)
         else {
             panic!("no statistics of an aniso map");
         };
@@ -228,14 +228,14 @@ mod tests {
         // Two normals tilted by 30 degrees to either side: their average has length cos 30.
         let at = |x: f32| [x * 0.5 + 0.5, 0.5, 0.0, 1.0];
         let Some(Statistics::Normal { average_length, tilt_degrees, outside_share }) =
-            Statistics::new(MapRole::Normal, &[at(0.5), at(-0.5)])
+            Statistics::new(Content::Normal, &[at(0.5), at(-0.5)])
         else {
             panic!("no statistics of a normal map");
         };
         assert!((average_length - 0.866_025).abs() < 1e-4, "{average_length}");
         assert!((tilt_degrees.mean - 30.0).abs() < 1e-3 && outside_share == 0.0, "{tilt_degrees:?}");
         let Some(Statistics::Normal { outside_share, .. }) =
-            Statistics::new(MapRole::Normal, &[[1.0, 1.0, 0.5, 1.0], [0.5, 0.5, 1.0, 1.0]])
+            Statistics::new(Content::Normal, &[[1.0, 1.0, 0.5, 1.0], [0.5, 0.5, 1.0, 1.0]])
         else {
             panic!("no statistics of a normal map");
         };

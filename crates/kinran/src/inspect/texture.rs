@@ -3,18 +3,15 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use clap::ValueEnum;
-use kinran_image::{Format, Texture, Transfer, read_texture};
+use kinran_image::{Texture, read_texture};
 use serde::Serialize;
 
 use super::statistics::Statistics;
-use super::{MapRole, bytes_text};
+use crate::content::Content;
+use crate::outputs::bytes_text;
 use crate::table::{list, table};
 use crate::view::file_name;
 use crate::{Console, Error};
-
-/// The key under which `kinran bake` says what a texture holds.
-const ROLE_KEY: &str = "KinranMap";
 
 #[derive(Serialize)]
 struct Report {
@@ -26,7 +23,7 @@ struct Report {
     height: u32,
     file_bytes: u64,
     texture_bytes: u64,
-    role: MapRole,
+    role: Content,
     metadata: BTreeMap<String, String>,
     levels: Vec<LevelReport>,
 }
@@ -40,15 +37,16 @@ struct LevelReport {
     statistics: Statistics,
 }
 
-pub(super) fn inspect(path: &Path, role: Option<MapRole>, console: &Console) -> Result<(), Error> {
+pub(super) fn inspect(path: &Path, role: Option<Content>, console: &Console) -> Result<(), Error> {
     let texture = read_texture(path)?;
     let file_bytes = std::fs::metadata(path).map_err(|e| kinran_image::Error::io(path, e))?.len();
     let role = match role {
         Some(role) => role,
         None => stored_role(path, &texture)?,
     };
+    let texels = texels(role, &texture);
     let levels = texture.levels.iter().enumerate().map(|(i, level)| -> Result<LevelReport, Error> {
-        let statistics = Statistics::new(role, &texture.decode_level(i)?)
+        let statistics = Statistics::new(texels, &texture.decode_level(i)?)
             .ok_or_else(|| Error::Internal(format!("{}: level {i} has no texels", path.display())))?;
         let bytes = level.data.len() as u64;
         Ok(LevelReport { width: level.width, height: level.height, bytes, statistics })
@@ -71,22 +69,24 @@ pub(super) fn inspect(path: &Path, role: Option<MapRole>, console: &Console) -> 
 }
 
 /// What the texture's own key says it holds, else what its format suggests.
-fn stored_role(path: &Path, texture: &Texture) -> Result<MapRole, Error> {
-    if let Some(name) = texture.metadata.get(ROLE_KEY) {
-        return MapRole::from_str(name, false).map_err(|_| {
-            let reason = format!("key {ROLE_KEY}: \"{name}\" is no map that is known; say --role what it is");
-            kinran_image::Error::malformed(path, reason).into()
-        });
-    }
-    Ok(match (texture.format, texture.transfer) {
-        (Format::Bc5, _) => MapRole::Normal,
-        (_, Transfer::Srgb) => MapRole::Color,
-        _ => MapRole::Data,
+fn stored_role(path: &Path, texture: &Texture) -> Result<Content, Error> {
+    let Some(name) = texture.metadata.get(Content::KEY) else { return Ok(Content::suggested(texture)) };
+    Content::named(name).ok_or_else(|| {
+        let key = Content::KEY;
+        let reason = format!("key {key}: \"{name}\" is no map that is known; say --role what it is");
+        kinran_image::Error::malformed(path, reason).into()
     })
 }
 
+/// As what texels are read: tiles and what lies over them hold what their format suggests.
+fn texels(role: Content, texture: &Texture) -> Content {
+    match role {
+        Content::Synthesized | Content::Detail => Content::suggested(texture),
+        other => other,
+    }
+}
+
 fn text(report: &Report) -> String {
-    let role = report.role.to_possible_value().expect("no role is hidden");
     let row = |name: &str, value: String| vec![name.to_owned(), value];
     let mut facts = vec![
         row("file", format!("{}, {}", report.file, bytes_text(report.file_bytes))),
@@ -101,11 +101,12 @@ fn text(report: &Report) -> String {
                 bytes_text(report.texture_bytes)
             ),
         ),
-        row("map", role.get_name().into()),
+        row("map", report.role.name().into()),
     ];
     facts.extend(report.metadata.iter().map(|(key, value)| row(key, value.clone())));
 
-    let headings = ["level", "size", "bytes"].into_iter().chain(Statistics::headings(report.role));
+    let headings =
+        ["level", "size", "bytes"].into_iter().chain(report.levels[0].statistics.headings().iter().copied());
     let mut rows = vec![headings.map(str::to_owned).collect()];
     rows.extend(report.levels.iter().enumerate().map(|(i, level)| {
         let mut cells =

@@ -211,7 +211,7 @@ impl Work {
     fn run(&mut self, job: Job) -> Result<Vec<Event>, Error> {
         match job {
             Job::Open(path, args) => {
-                let Model { path, scene, only_baked } = Model::open(&path)?;
+                let Model { path, scene, only_baked } = Model::open(&path, &args.model)?;
                 let view = View::new(&scene, &path.to_string_lossy(), &args)?;
                 let plain = vec![None; scene.materials.len()];
                 let prepared = view.scene(&scene, plain)?;

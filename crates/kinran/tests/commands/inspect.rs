@@ -120,3 +120,86 @@ fn an_unknown_map_name_in_the_file_is_not_guessed() {
     crate::common::refused(&["inspect", text(&path)], &["x.ktx2", "KinranMap", "velvet", "--role"]);
     assert_eq!(kinran_json(&["inspect", text(&path), "--role", "data"])["role"], "data");
 }
+
+/// Every file that the commands write, inspected; none is refused.
+#[test]
+fn a_file_that_kinran_writes_is_refused_by_inspect() {
+    let (folder, model) = square();
+    let maps = tempfile::tempdir().unwrap();
+    let grey = Image::new(32, 32, Channels::R, Pixels::U8(vec![90; 1024])).unwrap();
+    for (name, image) in
+        [("a_nor_gl", &bumps()), ("a_rough", &grey), ("a_ao", &grey), ("a_color", &bumps()), ("mask", &grey)]
+    {
+        std::fs::write(maps.path().join(format!("{name}.png")), kinran_image::encode_png(image).unwrap())
+            .unwrap();
+    }
+    let file = |name: &str| text(&maps.path().join(name)).to_owned();
+    let lower = format!("--layer={},scale=2", file("a_rough.png"));
+    let upper = format!("--layer={},scale=3,mask={}", file("a_ao.png"), file("mask.png"));
+    let normals = format!("--layer={},scale=2", file("a_nor_gl.png"));
+    let table = text(&folder.path().join("combed.exr")).to_owned();
+    let runs: [&[&str]; 8] = [
+        &["bake", text(maps.path()), "--form", "both", "--container", "both", "--ignore", "mask.png"],
+        &["bake", text(&model), "--all-textures", "--curvature", "all", "--curvature-dump", "json"],
+        &["bake", text(&model), "--form", "aniso", "--curvature", "all", "--curvature-dump", "exr"],
+        &["skin-lut", "--penumbra", "--size", "8x8", "--container", "both"],
+        &["detail", "solve", &file("a_color.png"), &lower, &upper, "--board", "--pictures"],
+        &["detail", "solve", &file("a_nor_gl.png"), "--kind", "normal", &normals],
+        &["compare", text(&model), "--size", "8x8", "--spp", "1", "--truth-spp", "1", "--distances", "1"],
+        &["fit", "fuzz", "--tilt", "30", "--spread", "0.05", "--table", &table],
+    ];
+    let mut roles = std::collections::BTreeSet::new();
+    for words in runs {
+        let out = tempfile::tempdir().unwrap();
+        let fit = words[0] == "fit";
+        let more = ["-o", text(out.path())];
+        let said = kinran_json(&[words, if fit { &[] } else { &more[..] }].concat());
+        if fit {
+            std::fs::copy(&table, out.path().join("combed.exr")).unwrap();
+            std::fs::write(out.path().join("fit.json"), said.to_string()).unwrap();
+        }
+        let written = crate::common::files(out.path());
+        assert!(!written.is_empty(), "{words:?} wrote nothing");
+        for name in written {
+            let path = out.path().join(&name);
+            let report = kinran_json(&["inspect", text(&path)]);
+            assert!(!kinran(&["inspect", text(&path)]).out.is_empty(), "{name}: nothing for people");
+            if let Some(role) = report["role"].as_str().filter(|_| name.ends_with(".ktx2")) {
+                assert!(
+                    name.contains(role.trim_start_matches("skin-")) || ["detail", "data"].contains(&role),
+                    "{name} is called {role}"
+                );
+                roles.insert(role.to_owned());
+            }
+            for file in report["written"].as_array().into_iter().flatten() {
+                assert_eq!(file["state"], "as-written", "{name}: {file}");
+            }
+        }
+    }
+    let all: std::collections::BTreeSet<String> =
+        kinran::content::Content::ALL.into_iter().map(|content| content.name().to_owned()).collect();
+    let missing: Vec<&String> = all.difference(&roles).filter(|role| *role != "data").collect();
+    assert!(missing.is_empty(), "no run wrote {missing:?}");
+}
+
+#[test]
+fn a_report_hides_that_its_files_have_changed() {
+    let (folder, model) = square();
+    let out = folder.path().join("out");
+    kinran_json(&["bake", text(&model), "-o", text(&out)]);
+    std::fs::write(out.join("square.glb"), "edited").unwrap();
+    std::fs::remove_file(out.join("square_hammered_normal.ktx2")).unwrap();
+    let report = out.join("square.kinran.json");
+    let state = |report: &serde_json::Value, name: &str| {
+        let files = report["written"].as_array().unwrap();
+        files.iter().find(|f| f["file"] == name).unwrap_or_else(|| panic!("{name} is not listed: {report}"))["state"]
+            .clone()
+    };
+    let said = kinran_json(&["inspect", text(&report)]);
+    assert_eq!(state(&said, "square.glb"), "changed");
+    assert_eq!(state(&said, "square_hammered_normal.ktx2"), "missing");
+    assert_eq!(state(&said, "square_hammered_roughness.ktx2"), "as-written");
+    let other = folder.path().join("other.json");
+    std::fs::write(&other, "{ \"a\": 1 }").unwrap();
+    crate::common::refused(&["inspect", text(&other)], &["other.json", "no JSON that kinran writes"]);
+}

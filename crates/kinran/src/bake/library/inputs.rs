@@ -173,8 +173,12 @@ impl Copies {
         // Names of files in the folder of maps stay names, and a model has no use for maps.
         let inside = |path: &Path| path.is_relative() && job.input.join(path).is_file();
         let stays = |path: &Path| job.kind == Kind::Mesh || (job.kind == Kind::Aniso && inside(path));
+        let named = match flags {
+            Flags::Detail(flags) => flags.model.as_ref(),
+            _ => None,
+        };
         let mut failed = Ok(());
-        let flags = flags.with_files(&mut |path| {
+        let mut flags = flags.with_files(&mut |path| {
             if stays(path) {
                 return path.to_path_buf();
             }
@@ -184,6 +188,23 @@ impl Copies {
             })
         });
         failed?;
+        let (original, model) = match (&mut flags, named) {
+            (Flags::Bake(flags), _) if job.kind == Kind::Mesh => (Some(&job.input), Some(&mut flags.model)),
+            (Flags::Detail(flags), named) => (named, Some(&mut flags.trust)),
+            _ => (None, None),
+        };
+        if let Some(model) = model {
+            // A copy of what a link leads to would be none.
+            if let Some(original) = original {
+                Document::open_allowing(original, model.allowed()?)?.check_files()?;
+            }
+            let allowed = model.allowed()?.iter().map(|folder| self.place(folder));
+            let allowed: Vec<PathBuf> = allowed.collect::<Result<_, Error>>()?;
+            for folder in &allowed {
+                fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
+            }
+            model.allow_outside = allowed;
+        }
 
         let job = Job { input, ..job.clone() };
         let sources = Sources::of(&job, &flags, &|model| Ok(Document::open(model)?.files()))?;
