@@ -21,6 +21,7 @@ use std::path::{Component, Path, PathBuf};
 use std::time::SystemTime;
 
 use kinran_image::{Error, Unfinished, is_temporary, write_atomically};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tempfile::TempDir;
 
@@ -47,7 +48,7 @@ impl Key {
 }
 
 /// A file of an entry.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct StoredFile {
     /// Relative to the entry's folder, `/`-separated.
     pub name: String,
@@ -69,7 +70,7 @@ pub struct Entry {
 }
 
 /// An entry as [`Cache::list`] sees it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Listed {
     /// Its key's digits.
     pub key: String,

@@ -43,6 +43,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use kinran_scene::Wrap;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 pub use evidence::{GREEN_CONFIDENCE, GreenGuess, green_correlation, guess_green};
@@ -158,7 +159,7 @@ fn listed(names: &[String]) -> String {
 }
 
 /// A row of the table: a file and what was understood of it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Row {
     /// The material; empty where the file belongs to none.
     pub material: String,
@@ -173,7 +174,7 @@ pub struct Row {
 }
 
 /// A folder understood. Serializes as its rows, without paths.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Folder {
     /// Every image file, material by material.
     pub rows: Vec<Row>,

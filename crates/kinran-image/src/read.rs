@@ -125,7 +125,26 @@ fn image_error(error: &ImageError) -> String {
         ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
             "the file ends too early, it is truncated".into()
         }
-        e => format!("{e}; the file is damaged or truncated"),
+        e => format!("{}; the file is damaged or truncated", plain(&e.to_string())),
+    }
+}
+
+/// A decoder's message without what it says in Rust: of `ChunkType { type: IHDR, critical: true, … }` the name, and of
+/// a stream that cannot be inflated nothing about the state of the decoder.
+fn plain(message: &str) -> String {
+    const CHUNK: &str = "ChunkType { type: ";
+    let mut plain = String::new();
+    let mut rest = message;
+    while let Some((before, chunk)) = rest.split_once(CHUNK) {
+        let (fields, after) = chunk.split_once('}').unwrap_or((chunk, ""));
+        plain += before;
+        plain += fields.split(',').next().unwrap_or("");
+        rest = after;
+    }
+    plain += rest;
+    match plain.split_once("Corrupt deflate stream") {
+        Some((before, _)) => format!("{before}a stream in it cannot be inflated"),
+        None => plain,
     }
 }
 
@@ -314,4 +333,36 @@ fn decode_exr(mut file: impl Read + Seek + Send, stored: u64) -> Result<Image, S
         }
     }
     finite_image(width, height, channels, Pixels::F32(samples))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_decoder_says_of_a_damaged_png_is_no_rust() {
+        let whole = crate::encode_png(&Image::new(8, 8, Channels::R, Pixels::U8((0..64).collect())).unwrap())
+            .unwrap();
+        let mut kinds = std::collections::BTreeSet::new();
+        for at in 8..whole.len() {
+            for bit in [1, 128] {
+                let mut bytes = whole.clone();
+                bytes[at] ^= bit;
+                let Err(error) = decode_image(Path::new("a.png"), &bytes) else { continue };
+                let said = error.to_string();
+                assert!(
+                    !said.contains(['{', '}']) && !said.contains("Debug") && !said.contains("::"),
+                    "byte {at}: {said}"
+                );
+                kinds.insert(said);
+            }
+        }
+        assert!(kinds.iter().any(|said| said.contains("IDAT")), "{kinds:?}");
+        assert_eq!(
+            plain(
+                "a ChunkType { type: tRNS, critical: false, private: false } b ChunkType { type: PLTE, c: true }"
+            ),
+            "a tRNS b PLTE"
+        );
+    }
 }

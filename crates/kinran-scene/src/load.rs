@@ -1007,6 +1007,10 @@ impl Loader<'_> {
             self.warn(format!("{what} stands in a node that is scaled to nothing; it was left out"));
             return Ok(());
         };
+        if !transform.translation.as_vec3().is_finite() {
+            self.warn(format!("{what} stands farther away than a float can say; it was left out"));
+            return Ok(());
+        }
         self.scene.lights.push(Light {
             kind,
             color,
@@ -1041,7 +1045,12 @@ impl Loader<'_> {
         };
         let rigid =
             DAffine3::from_mat3_translation(DMat3::from_cols(x, z.cross(x), z), transform.translation);
-        self.scene.cameras.push(Camera { transform: rigid.as_affine3a(), yfov });
+        let transform = rigid.as_affine3a();
+        if !transform.is_finite() {
+            self.warn(format!("{what} stands farther away than a float can say; it was left out"));
+            return Ok(());
+        }
+        self.scene.cameras.push(Camera { transform, yfov });
         Ok(())
     }
 

@@ -15,9 +15,9 @@ use crate::{Error, Progress};
 /// What draws a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Backend {
-    /// [`kinran_render::reference`].
+    /// The reference renderer
     Cpu,
-    /// `kinran_render::realtime`.
+    /// As a game draws, by Vulkan
     Gpu,
 }
 

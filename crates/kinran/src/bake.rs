@@ -4,14 +4,14 @@ pub(crate) mod curvature;
 mod folder;
 mod gltf;
 mod library;
-mod report;
+pub(crate) mod report;
 mod settings;
 
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use kinran_bake::aniso::{Filter, Kernel, Sheet, SurfaceOptions};
-use kinran_bake::folder::{Green, Hints, Role as MapRole};
+use kinran_bake::folder::{FolderError, Green, Hints, Role as MapRole};
 use kinran_image::{
     Encoder, Encoding, Format, Preset, Role, Texture, encode_dds, encode_ktx2, full_level_count, level_size,
     write_atomically,
@@ -19,6 +19,7 @@ use kinran_image::{
 use kinran_scene::Wrap;
 
 use crate::content::Content;
+use crate::init::{MANIFEST, Survey};
 use crate::model::ModelArgs;
 use crate::outputs::{Space, check_folder, has_extension};
 use crate::values::{filter, number};
@@ -46,19 +47,20 @@ pub use report::{Input, Output, Report, SurfaceReport};
 #[command(after_help = "Examples:
   kinran bake materials/brocade -o baked/
   kinran bake lamp.glb -o baked/
-  kinran bake materials/brocade -o baked/ --form both --container dds --filter linear
+  kinran bake materials/brocade -o baked/ \\
+      --form both --container dds --filter linear
   kinran bake scans/ -o baked/ --y-down --map direction=flow.png
   kinran bake materials/brocade -o baked/ --dry-run
   kinran bake kinran.toml --watch
 
-Engines: --form aniso (folders' default) is the compact form, decoded in the shader as docs/aniso.md tells;
---form khr is glTF's roughness and anisotropy maps, for viewers that know nothing of Kinran.")]
+Engines: --form aniso (folders' default) is the compact form, decoded in the shader as docs/aniso.md \
+tells; --form khr is glTF's roughness and anisotropy maps, for viewers that know nothing of Kinran.")]
 pub struct Args {
     /// A folder of maps, a .glb, a .gltf or a kinran.toml
     #[arg(value_name = "INPUT")]
     pub input: PathBuf,
 
-    /// Where the files go; made if it is not there. A kinran.toml may say it instead
+    /// Where the files go; made if it is not there [default: what a kinran.toml says, else baked beside the input]
     #[arg(long, short, value_name = "DIR")]
     pub output: Option<PathBuf>,
 
@@ -146,6 +148,14 @@ pub struct Args {
     #[arg(long)]
     pub force_normal: bool,
 
+    /// Only says what was understood, or of a kinran.toml what would be baked
+    #[arg(long)]
+    pub dry_run: bool,
+
+    /// Overwrites files that kinran did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
+
     #[command(flatten)]
     #[allow(missing_docs)]
     pub model: ModelArgs,
@@ -153,14 +163,6 @@ pub struct Args {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub curvature: CurvatureArgs,
-
-    /// Only say what was understood
-    #[arg(long)]
-    pub dry_run: bool,
-
-    /// Overwrites files that kinran did not write, or that were changed since
-    #[arg(long)]
-    pub force: bool,
 
     /// Flags that only a manifest takes.
     #[command(flatten)]
@@ -371,25 +373,57 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             "--watch, --jobs and --cache need a kinran.toml; name one as the input".into(),
         ));
     }
-    if args.output.is_none() && !args.dry_run {
-        return Err(Error::Usage("--output is missing; say in which folder the files go".into()));
-    }
     check_formats(args)?;
+    let gltf = has_extension(&args.input, "glb") || has_extension(&args.input, "gltf");
+    if args.input.is_file() && !gltf {
+        let reason = match has_extension(&args.input, "obj") {
+            true => "an OBJ brings no materials with maps; save it as .glb (Blender does) and bake that",
+            false => "is neither a folder of maps, a .glb or .gltf, nor a kinran.toml; name one of these",
+        };
+        return Err(Error::file_error(&args.input, reason));
+    }
+    let nowhere = args.output.is_none() && !args.dry_run;
+    let args =
+        &Args { output: Some(args.output.clone().unwrap_or_else(|| beside(&args.input))), ..args.clone() };
     if !args.dry_run {
         check_folder(args.output())?;
     }
-    let gltf = has_extension(&args.input, "glb") || has_extension(&args.input, "gltf");
-    if args.input.is_file() && !gltf {
-        return Err(Error::Usage(format!(
-            "{}: is neither a folder of maps, a .glb or .gltf, nor a kinran.toml; name one of these",
-            args.input.display()
-        )));
-    }
     match (gltf && !args.input.is_dir(), args.dry_run) {
-        (false, false) => folder::run(args, console),
-        (false, true) => folder::dry_run(args, console),
+        (false, false) => folder::run(args, console).map_err(|e| with_a_way(e, console)),
+        (false, true) => folder::dry_run(args, console).map_err(|e| with_a_way(e, console)),
         (true, false) => gltf::run(args, console),
         (true, true) => gltf::dry_run(args, console),
+    }?;
+    if nowhere {
+        console.note(format!("no --output was given: the files went to {}", args.output().display()));
+    }
+    Ok(())
+}
+
+/// The output where nobody says one: `baked` in the folder that the input is in.
+fn beside(input: &Path) -> PathBuf {
+    // "." and ".." have no parent in their names.
+    let full = input.file_name().is_none().then(|| input.canonicalize().ok()).flatten();
+    full.as_deref().unwrap_or(input).parent().unwrap_or(Path::new("")).join("baked")
+}
+
+/// The error of a folder without maps; where there is something to bake below it, the way to do that.
+fn with_a_way(error: Error, console: &Console) -> Error {
+    let Error::Folder(FolderError::NoMaps { folder, .. }) = &error else { return error };
+    let manifest = folder.join(MANIFEST);
+    if manifest.is_file() {
+        let reason = format!(
+            "holds no maps, but a {MANIFEST}; `kinran bake {}` bakes what it lists",
+            manifest.display()
+        );
+        return Error::file_error(folder, reason);
+    }
+    match Survey::of(folder, &console.progress()) {
+        Ok(survey) if !survey.is_empty() => {
+            let way = format!("`kinran init {}` writes a {MANIFEST} for them", folder.display());
+            Error::file_error(folder, format!("holds no maps, but {}; {way}", survey.counts()))
+        }
+        _ => error,
     }
 }
 

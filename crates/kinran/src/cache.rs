@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use kinran_bake::cache::{Cache, Listed};
 use kinran_bake::manifest::size;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::bake::{LibraryArgs, cache_folder};
@@ -33,7 +34,7 @@ pub struct Args {
 }
 
 /// What a cache holds.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct CacheReport {
     /// Its folder.
     pub folder: PathBuf,
@@ -66,9 +67,11 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             CacheReport { folder: folder.clone(), bytes: 0, entries: vec![], removed: 0, removed_bytes: 0 };
         return console.result(&report, &format!("{}: nothing is kept yet\n", folder.display()));
     }
+    let busy = console.progress().busy("looking through the cache");
     let limit = if args.clean { Some(0) } else { args.keep };
     let (removed, removed_bytes) = limit.map_or(Ok((0, 0)), |limit| cache.evict(limit))?;
     let entries = cache.list()?;
+    drop(busy);
     let bytes = entries.iter().map(|entry| entry.bytes).sum();
 
     let mut text = list(&entries.iter().map(row).collect::<Vec<_>>());

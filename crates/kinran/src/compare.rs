@@ -8,6 +8,7 @@ use kinran_render::metrics::{flip, rmse_linear, rmse_srgb8};
 use kinran_render::reference::{Film, RenderScene, SurfaceTextures, TextureFiltering};
 use kinran_scene::Scene;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::compare_sheet::{comparison_sheet, distance_sheet};
@@ -32,10 +33,12 @@ use crate::{Console, Error, Progress, outputs};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran compare lamp.glb -o comparison/
-  kinran compare lamp.glb -o comparison/ --filters ml,naive --truth-spp 1024 --distances 1,4,16
-  kinran compare cloth.glb -o comparison/ --env none --light 1,1,1 --size 640x480 --json")]
+  kinran compare lamp.glb -o comparison/ --filters ml,naive \\
+      --truth-spp 1024 --distances 1,4,16
+  kinran compare cloth.glb -o comparison/ --env none \\
+      --light 1,1,1 --size 640x480 --json")]
 pub struct Args {
-    /// The .glb or .gltf file
+    /// The .glb, .gltf or .obj file
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
@@ -96,7 +99,7 @@ pub struct Options {
 }
 
 /// How far a picture is from ground truth.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Difference {
     /// Factor of distance.
     pub distance: f32,
@@ -113,7 +116,7 @@ pub struct Difference {
 }
 
 /// The numbers of one filter.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MethodReport {
     /// The filter's name.
     pub filter: &'static str,
@@ -124,7 +127,7 @@ pub struct MethodReport {
 /// How far two ground truths of other random numbers are apart, each of half the samples. The noise of the one that filters
 /// are compared with is half of this RMSE: one of two noisy pictures has 1/sqrt(2) of their difference, and twice the samples
 /// take another 1/sqrt(2).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Noise {
     /// As [`Difference::rmse`].
     pub rmse: f64,
@@ -133,7 +136,7 @@ pub struct Noise {
 }
 
 /// Who is nearest to ground truth by one measure of error.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Ranking {
     /// The filter that is nearer than all others by more than noise explains and as printed, if one is.
     pub best: Option<&'static str>,
@@ -147,7 +150,7 @@ pub struct Ranking {
 }
 
 /// What one distance shows.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
     /// Factor of distance.
     pub distance: f32,
@@ -170,7 +173,7 @@ pub struct Finding {
 }
 
 /// All numbers of a comparison.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Report {
     /// What was compared.
     pub title: String,

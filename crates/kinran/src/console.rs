@@ -1,6 +1,8 @@
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stderr, stdout};
+use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{Error, Progress};
@@ -14,8 +16,54 @@ pub struct Console {
     pub verbose: bool,
     /// Results as JSON.
     pub json: bool,
-    /// Shows these bars, whatever is said above: those of work that is a part of other work.
+    /// Where bars show: those of the whole command, or of the work that this one is a part of. `None` for none.
     pub bars: Option<Progress>,
+}
+
+/// Why a command failed, for programs: what `--json` prints in the place of the result, as `error`.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Failure {
+    /// What kind of error it is, see [`Error::code`].
+    pub code: &'static str,
+    /// What is wrong, and what to do about it; one line.
+    pub message: String,
+    /// The file or folder that it is about, where it is about one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// The line in the file, from 1, where it is a text.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<usize>,
+    /// The character in the line, from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub column: Option<usize>,
+    /// The program's exit code: 2 where the input or the flags are to blame, 1 where the program is.
+    pub exit_code: u8,
+}
+
+/// The document that `--json` prints where there is no result.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Failed {
+    /// Why.
+    pub error: Failure,
+}
+
+/// Characters of the longest word that is said whole: more than a path has that a person would type.
+const WORD: usize = 300;
+
+/// A word too long for a message without its middle; `None` for one that is short enough.
+pub(crate) fn shortened(word: &str) -> Option<String> {
+    let length = word.chars().count();
+    (length > WORD).then(|| {
+        let head: String = word.chars().take(WORD / 5).collect();
+        let tail: String = word.chars().skip(length - WORD / 5).collect();
+        format!("{head}…{tail}")
+    })
+}
+
+/// A message in one line, without what would bury it.
+fn one_line(message: &str) -> String {
+    let word = |word| shortened(word).unwrap_or_else(|| word.to_owned());
+    message.split_whitespace().map(word).collect::<Vec<_>>().join(" ")
 }
 
 impl Console {
@@ -40,34 +88,67 @@ impl Console {
     /// Tells a warning, unless quiet.
     pub fn warn(&self, warning: impl Display) {
         if !self.quiet {
-            // Nobody is left to tell that standard error is closed.
-            let _ = writeln!(stderr(), "warning: {warning}");
+            self.tell(&format!("warning: {}", one_line(&warning.to_string())));
         }
     }
 
-    /// Tells what goes on, unless quiet.
+    /// Tells what goes on, or was done without being asked for, unless quiet.
     pub fn note(&self, note: impl Display) {
         if !self.quiet {
-            let _ = writeln!(stderr(), "{note}");
+            self.tell(&note.to_string());
         }
     }
 
     /// Tells an error, in one line.
     pub fn error(&self, error: impl Display) {
-        let line = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-        let _ = writeln!(stderr(), "error: {line}");
+        self.tell(&format!("error: {}", one_line(&error.to_string())));
     }
 
-    /// Tells why a command failed, and shows the place in the file where there is one.
+    fn tell(&self, line: &str) {
+        self.progress().suspend(|| {
+            // Nobody is left to tell that standard error is closed.
+            let _ = writeln!(stderr(), "{line}");
+        });
+    }
+
+    /// Tells why a command failed, and shows the place in the file where there is one; with `--json` also as the one
+    /// document on standard output, unless the result is there already and says it.
     pub fn failure(&self, error: &Error) {
         self.error(error);
         if let Some(snippet) = error.snippet() {
-            let _ = writeln!(stderr(), "{snippet}");
+            self.tell(snippet);
+        }
+        if self.json && !matches!(error, Error::Entries { .. } | Error::Stdout(_)) {
+            let (line, column) = error.line_and_column().unzip();
+            let failure = Failure {
+                code: error.code(),
+                message: one_line(&error.to_string()),
+                file: error.file().map(Path::to_path_buf),
+                line,
+                column,
+                exit_code: error.exit_code(),
+            };
+            // Where standard output is closed, standard error has told it.
+            let _ = self.result(&Failed { error: failure }, "");
         }
     }
 
-    /// Progress bars that show unless quiet or JSON is asked for.
+    /// The bars of this work.
     pub fn progress(&self) -> Progress {
-        self.bars.clone().unwrap_or_else(|| Progress::new(!self.quiet && !self.json))
+        self.bars.clone().unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_is_one_line_that_can_be_read() {
+        assert_eq!(one_line("a\n  b\tc"), "a b c");
+        let long = format!("{}: is too long", "é".repeat(5000));
+        let said = one_line(&long);
+        assert!(said.chars().count() < 200 && said.ends_with("é: is too long"), "{said}");
+        assert_eq!(shortened(&"x".repeat(WORD)), None);
     }
 }

@@ -1,9 +1,12 @@
 //! What a texture holds, as its key and its sidecar name it: one list for those who write, inspect and draw.
 
+use std::borrow::Cow;
+
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use kinran_bake::aniso::Sheet;
 use kinran_image::{Format, Texture, Transfer};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer};
 
 /// What a texture that Kinran writes holds.
@@ -115,6 +118,16 @@ impl ValueEnum for Content {
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(self.name()))
+    }
+}
+
+impl JsonSchema for Content {
+    fn schema_name() -> Cow<'static, str> {
+        "Content".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "string", "enum": Content::ALL.map(Content::name) })
     }
 }
 

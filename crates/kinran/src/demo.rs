@@ -17,6 +17,7 @@ use kinran_bake::aniso::Filter;
 use kinran_image::write_atomically;
 use kinran_render::reference::TextureFiltering;
 use kinran_scene::Scene;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::compare::{self, Finding, MethodReport, compare};
@@ -85,8 +86,13 @@ const QUICK: Scale = Scale {
     distances: &[1.0, 2.0],
 };
 
+/// Parts of the time that the three steps of a material take, as measured, for the estimate.
+const MAKING: u64 = 1;
+const DRAWING: u64 = 2;
+const COMPARING: u64 = 4;
+
 /// What the demo made of one material. Paths are relative to the output folder.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub(crate) struct Shown {
     #[serde(skip)]
     subject: Subject,
@@ -111,8 +117,8 @@ pub(crate) struct Shown {
     commands: Vec<String>,
 }
 
-#[derive(Serialize)]
-struct Summary {
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct Summary {
     page: String,
     materials: Vec<Shown>,
 }
@@ -126,16 +132,21 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     outputs::refuse_other_page(&args.output.join("index.html"))?;
     let scale = if args.quick { &QUICK } else { &FULL };
     let progress = console.progress();
+    let all = progress.stage("demo", Subject::ALL.len() as u64 * (MAKING + DRAWING + COMPARING));
     for subject in Subject::ALL {
-        make(subject, scale, &args.output)?;
+        make(subject, scale, &args.output, console)?;
+        all.add(MAKING);
     }
     for subject in Subject::ALL {
         take_picture(subject, scale, &args.output, &progress)?;
+        all.add(DRAWING);
     }
     let mut materials = Vec::new();
     for subject in Subject::ALL {
         materials.push(show(subject, scale, &args.output, &progress)?);
+        all.add(COMPARING);
     }
+    drop(all);
     let page = args.output.join("index.html");
     write_atomically(&page, page::page(&materials).as_bytes())?;
 
@@ -168,11 +179,14 @@ fn picture(subject: Subject) -> String {
 }
 
 /// Maps, textures and model.
-fn make(subject: Subject, scale: &Scale, folder: &Path) -> Result<(), Error> {
+fn make(subject: Subject, scale: &Scale, folder: &Path, console: &Console) -> Result<(), Error> {
+    let painting = console.progress().busy(format!("painting {}", subject.name()));
     let maps = subject.maps(scale.texels)?;
     let maps_folder = folder.join(maps_folder(subject));
     maps.write(&maps_folder, subject.name())?;
-    bake_textures(&maps_folder, &folder.join(baked_folder(subject)))?;
+    drop(painting);
+    bake_textures(&maps_folder, &folder.join(baked_folder(subject)), console)?;
+    let _busy = console.progress().busy(format!("modelling {}", subject.name()));
     subject.write(&folder.join(model(subject)), &maps, scale.detail)
 }
 
@@ -225,7 +239,7 @@ fn show(subject: Subject, scale: &Scale, folder: &Path, progress: &Progress) -> 
 }
 
 /// `kinran bake` on a folder of maps.
-fn bake_textures(maps: &Path, output: &Path) -> Result<(), Error> {
+fn bake_textures(maps: &Path, output: &Path, console: &Console) -> Result<(), Error> {
     #[derive(Parser)]
     struct Flags {
         #[command(flatten)]
@@ -235,7 +249,7 @@ fn bake_textures(maps: &Path, output: &Path) -> Result<(), Error> {
     let flags = Flags::try_parse_from(words).map_err(|e| Error::Internal(e.to_string()))?;
     // Everything in the demo's folder is the demo's.
     let bake = bake::Args { force: true, ..flags.bake };
-    bake::run(&bake, &Console { quiet: true, ..Console::default() })
+    bake::run(&bake, &Console { quiet: true, bars: console.bars.clone(), ..Console::default() })
 }
 
 /// The model's own camera and lights; of the built-in studio only the diffuse light, which has no noise.

@@ -1,9 +1,19 @@
+use std::path::{Path, PathBuf};
+
 /// Why a command failed. The message is one line: what is wrong where, and what to do about it.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A flag or a combination of flags cannot be served.
     #[error("{0}")]
     Usage(String),
+    /// A file or folder is not what a command takes.
+    #[error("{}: {reason}", path.display())]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong, and what to do about it.
+        reason: String,
+    },
     /// An image or a texture could not be read or written.
     #[error(transparent)]
     Image(#[from] kinran_image::Error),
@@ -49,6 +59,81 @@ impl Error {
     pub fn snippet(&self) -> Option<&str> {
         match self {
             Error::Manifest(error) => Some(&error.snippet),
+            _ => None,
+        }
+    }
+
+    /// An [`Error::File`] about `path`.
+    pub fn file_error(path: impl AsRef<Path>, reason: impl Into<String>) -> Self {
+        Error::File { path: path.as_ref().to_path_buf(), reason: reason.into() }
+    }
+
+    /// What kind of error it is, in a word that stays the same: `usage` flags; `input` a file of the wrong kind or in
+    /// the wrong place; `io` the system refused; `malformed` a damaged file; `unsupported` a sound one with something
+    /// that is not known; `maps` a folder of maps that cannot be understood; `manifest`; `entries` of a manifest failed;
+    /// `render`; `gpu`; `shader`; `internal` a defect of the program.
+    pub fn code(&self) -> &'static str {
+        use kinran_bake::folder::FolderError;
+        use kinran_render::Error as RenderError;
+        fn of_image(error: &kinran_image::Error) -> &'static str {
+            match error {
+                kinran_image::Error::Io { .. } => "io",
+                kinran_image::Error::Malformed { .. } => "malformed",
+                kinran_image::Error::Unsupported(_) => "unsupported",
+            }
+        }
+        match self {
+            Error::Usage(_) | Error::Folder(FolderError::Flag { .. }) => "usage",
+            Error::Render(RenderError::Setting { .. }) => "usage",
+            Error::File { .. } | Error::Folder(FolderError::NotAFolder(_)) => "input",
+            Error::Image(error)
+            | Error::Folder(FolderError::Image(error))
+            | Error::Scene(kinran_scene::Error::Image(error)) => of_image(error),
+            Error::Scene(kinran_scene::Error::Io { .. }) | Error::Stdout(_) => "io",
+            Error::Scene(kinran_scene::Error::Malformed { .. }) => "malformed",
+            Error::Scene(kinran_scene::Error::Unsupported { .. }) => "unsupported",
+            Error::Folder(_) => "maps",
+            Error::Manifest(_) => "manifest",
+            Error::Entries { .. } => "entries",
+            Error::Render(RenderError::Gpu(_)) => "gpu",
+            Error::Render(RenderError::Shader(_)) => "shader",
+            Error::Render(RenderError::Scene(_)) => "render",
+            Error::Render(RenderError::SizeMismatch { .. }) | Error::Internal(_) => "internal",
+        }
+    }
+
+    /// The file or folder that it is about.
+    pub fn file(&self) -> Option<&Path> {
+        use kinran_bake::folder::FolderError;
+        match self {
+            Error::File { path, .. } => Some(path),
+            Error::Image(error)
+            | Error::Folder(FolderError::Image(error))
+            | Error::Scene(kinran_scene::Error::Image(error)) => match error {
+                kinran_image::Error::Io { path, .. } | kinran_image::Error::Malformed { path, .. } => {
+                    Some(path)
+                }
+                kinran_image::Error::Unsupported(_) => None,
+            },
+            Error::Scene(
+                kinran_scene::Error::Io { path, .. }
+                | kinran_scene::Error::Malformed { path, .. }
+                | kinran_scene::Error::Unsupported { path, .. },
+            ) => Some(path),
+            Error::Folder(
+                FolderError::NotAFolder(path)
+                | FolderError::NoMaps { folder: path, .. }
+                | FolderError::Unfit { path, .. },
+            ) => Some(path),
+            Error::Manifest(error) => Some(&error.path),
+            _ => None,
+        }
+    }
+
+    /// The place in a manifest, from 1.
+    pub fn line_and_column(&self) -> Option<(usize, usize)> {
+        match self {
+            Error::Manifest(error) => Some((error.line, error.column)),
             _ => None,
         }
     }

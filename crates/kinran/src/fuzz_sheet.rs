@@ -15,6 +15,7 @@ use kinran_render::reference::{
 use kinran_scene::{Environment, Fuzz, FuzzAttenuation, FuzzLayer, Light, LightKind, Wrap};
 use kinran_shading::fuzz::fibre_direction;
 use kinran_shading::sh::sh_evaluate;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::backend::{Backend, Painter};
@@ -40,11 +41,12 @@ use crate::{Console, Error, Progress, outputs};
 #[command(after_help = "Examples:
   kinran fuzz horse.gltf -o horse_fuzz/
   kinran fuzz sofa.gltf -o sofa_fuzz/ --base own --color 0.9,0.85,0.8
-  kinran fuzz curtain.gltf -o crushed/ --direction swirl --spread 0.1 --tilt 50 --color 0.5,0.05,0.1 --sheet light
+  kinran fuzz curtain.gltf -o crushed/ --direction swirl \\
+      --spread 0.1 --tilt 50 --color 0.5,0.05,0.1 --sheet light
   kinran fuzz sofa.gltf -o felt/ --sheet simple --backend gpu
   kinran fuzz horse.gltf -o both/ --sheet realtime --spp 256 --size 128x128")]
 pub struct Args {
-    /// The .glb or .gltf file, or a folder that holds one, or the textures that `kinran bake` wrote
+    /// The .glb, .gltf or .obj file, or a folder that holds one, or the textures that `kinran bake` wrote
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
@@ -96,6 +98,13 @@ pub struct Args {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub view: ViewArgs,
+}
+
+impl Args {
+    /// Whether any sheet is drawn on a GPU.
+    pub(crate) fn draws_on_a_gpu(&self) -> bool {
+        self.backend == Backend::Gpu || self.sheet.contains(&Sheet::Realtime)
+    }
 }
 
 /// What a sheet varies.
@@ -154,8 +163,8 @@ const LIGHTS: [Vec3; 3] = [vec3(-0.6, 0.6, 0.7), vec3(0.9, 0.5, -0.6), vec3(-0.8
 /// How many times as bright as the lights of flags each of them is, for dark cloth; chosen by eye.
 const BRIGHTNESS: f32 = 4.0;
 
-#[derive(Serialize)]
-struct Summary {
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct Summary {
     files: Vec<String>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     flip: Vec<Difference>,
@@ -163,7 +172,7 @@ struct Summary {
 }
 
 /// A real-time picture against the reference.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Difference {
     light: &'static str,
     flip: f32,
@@ -195,6 +204,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         true => Some(Backend::Gpu.open(None)?),
         false => None,
     };
+    let progress = console.progress();
+    let reading = progress.busy(format!("reading {}", file_name(&args.file)));
     let Model { path, mut scene, only_baked } = Model::open(&args.file, &args.view.model)?;
     for material in &mut scene.materials {
         if let Some(base) = base {
@@ -207,7 +218,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         }
     }
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
-    let progress = console.progress();
+    drop(reading);
     let mips = if only_baked { Mips::Baked } else { Mips::Filtered(Filter::Linear) };
     let (surfaces, apart) = scene_surfaces(&scene, mips, &progress)?;
     let prepared = view.scene(&scene, surfaces)?;
@@ -228,6 +239,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
     let mut text = String::new();
     let (mut files, mut flip) = (Vec::new(), Vec::new());
+    let all = progress.stage("sheets", sheets.len() as u64);
     for sheet in sheets {
         let name = sheet_file(sheet);
         let picture = match &realtime {
@@ -240,7 +252,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         };
         picture.write(&args.output.join(&name))?;
         files.push(name);
+        all.add(1);
     }
+    drop(all);
     for Difference { light, flip } in &flip {
         writeln!(text, "FLIP {flip:.4}: {light}").expect("strings grow");
     }

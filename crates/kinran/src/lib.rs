@@ -6,8 +6,10 @@
 mod backend;
 pub mod bake;
 pub mod cache;
+pub mod cli;
 pub mod compare;
 mod compare_sheet;
+pub mod completions;
 mod console;
 pub mod content;
 pub mod demo;
@@ -15,6 +17,7 @@ pub mod detail;
 mod error;
 pub mod fit;
 pub mod fuzz_sheet;
+pub mod init;
 pub mod inspect;
 pub mod model;
 mod outputs;
@@ -23,6 +26,7 @@ pub mod picture;
 mod progress;
 mod ranking;
 pub mod render;
+mod schema;
 pub mod shaders;
 pub mod skin;
 pub mod skin_lut;
@@ -34,6 +38,7 @@ pub mod view;
 #[cfg(feature = "view")]
 pub mod viewer;
 
-pub use console::Console;
+pub use console::{Console, Failed, Failure};
 pub use error::Error;
 pub use progress::{Progress, Stage};
+pub use schema::schemas;

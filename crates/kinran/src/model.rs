@@ -87,7 +87,7 @@ impl Place {
     /// # Errors
     /// [`Error::Usage`] for a path that does not exist and a folder with nothing to show, or with several models.
     pub fn of(path: &Path) -> Result<Self, Error> {
-        let complain = |e: &dyn std::fmt::Display| Error::Usage(format!("{}: {e}", path.display()));
+        let complain = |e: &dyn std::fmt::Display| Error::file_error(path, e.to_string());
         if !path.exists() {
             return Err(complain(&"there is no such file or folder"));
         }
@@ -107,10 +107,10 @@ impl Place {
             files.iter().filter(|file| ends(file)).cloned().collect()
         };
         let sidecars = ending(&[".kinran.json"]);
-        match ending(&[".glb", ".gltf"]).as_slice() {
+        match ending(&[".glb", ".gltf", ".obj"]).as_slice() {
             [model] => Ok(Place::File(model.clone())),
             [] if sidecars.is_empty() => Err(complain(
-                &"no .glb or .gltf file in this folder, and no textures that `kinran bake` wrote with their .kinran.json; name a model, or bake one",
+                &"no .glb, .gltf or .obj file in this folder, and no textures that `kinran bake` wrote with their .kinran.json; name a model, or bake one",
             )),
             [] => Ok(Place::Textures(path.into(), sidecars)),
             models @ [first, ..] => Err(complain(&format!(

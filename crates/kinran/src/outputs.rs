@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use kinran_scene::Packed;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -19,18 +20,17 @@ pub(crate) fn has_extension(path: &Path, extension: &str) -> bool {
 pub(crate) fn check_file(path: &Path, extensions: &[&str]) -> Result<(), Error> {
     if !extensions.iter().any(|e| has_extension(path, e)) {
         let wanted = extensions.iter().map(|e| format!(".{e}")).collect::<Vec<_>>().join(" or ");
-        return Err(Error::Usage(format!("{}: the name must end in {wanted}; rename it", path.display())));
+        return Err(Error::file_error(path, format!("the name must end in {wanted}; rename it")));
     }
     if path.is_dir() {
-        return Err(Error::Usage(format!("{}: is a folder; name a file", path.display())));
+        return Err(Error::file_error(path, "is a folder; name a file"));
     }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
-        return Err(Error::Usage(format!(
-            "{}: there is no folder {}; make it first",
-            path.display(),
-            folder.display()
-        )));
+        return Err(Error::file_error(
+            path,
+            format!("there is no folder {}; make it first", folder.display()),
+        ));
     }
     check_writable(folder)
 }
@@ -39,7 +39,7 @@ pub(crate) fn check_file(path: &Path, extensions: &[&str]) -> Result<(), Error> 
 pub(crate) fn check_folder(path: &Path) -> Result<(), Error> {
     let existing = existing_folder(path);
     if !existing.is_dir() {
-        return Err(Error::Usage(format!("{}: is a file; name a folder", existing.display())));
+        return Err(Error::file_error(existing, "is a file; name a folder"));
     }
     check_writable(&existing)
 }
@@ -102,7 +102,7 @@ pub(crate) fn changed_files(folder: &Path, packed: &Packed) -> Vec<String> {
 }
 
 /// A file that was written, as the report beside it names it.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub struct WrittenFile {
     /// Its path from the report's folder, `/`-separated.
     pub file: String,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use kinran_image::{Channels, Image, Pixels, write_exr, write_png};
 use kinran_render::reference::TextureFiltering;
 use kinran_scene::Scene;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 pub use crate::backend::Backend;
@@ -27,14 +28,16 @@ use crate::{Console, Error, outputs};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran render lamp.glb -o lamp.png
-  kinran render lamp.glb -o lamp.exr --size 1920x1080 --spp 256 --env studio.hdr --env-rotation 90
+  kinran render lamp.glb -o lamp.exr --size 1920x1080 --spp 256 \\
+      --env studio.hdr --env-rotation 90
   kinran render lamp.glb -o far.png --distance 8 --filter naive
   kinran render lamp.glb -o truth.png --filter none --spp 1024
-  kinran render lamp.glb -o sun.png --env none --light 1,2,1 --background 0.2,0.3,0.5
+  kinran render lamp.glb -o sun.png --env none \\
+      --light 1,2,1 --background 0.2,0.3,0.5
   kinran render baked/brocade/ -o brocade.png
   kinran render lamp.glb -o game.png --backend gpu")]
 pub struct Args {
-    /// The .glb or .gltf file, or a folder that holds one, or the textures that `kinran bake` wrote
+    /// The .glb, .gltf or .obj file, or a folder that holds one, or the textures that `kinran bake` wrote
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
@@ -79,8 +82,8 @@ fn mips(text: &str) -> Result<Mips, String> {
     filter(text).map(Mips::Filtered).map_err(|e| format!("{e}, none, baked"))
 }
 
-#[derive(Serialize)]
-struct Summary {
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct Summary {
     output: String,
     width: u32,
     height: u32,
@@ -99,8 +102,11 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     outputs::check_file(&args.output, &["png", "exr"])?;
     args.view.refuse_inputs(&args.file, [args.output.clone()])?;
     let painter = args.backend.open(args.shaders.as_deref())?;
+    let progress = console.progress();
+    let reading = progress.busy(format!("reading {}", file_name(&args.file)));
     let Model { path, scene, only_baked } = Model::open(&args.file, &args.view.model)?;
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
+    drop(reading);
     let own = Mips::of(&scene);
     let mips = args.filter.unwrap_or(own);
     let refuse =
@@ -113,7 +119,6 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if mips == Mips::Baked && own != Mips::Baked {
         return refuse("no material has its maps in KTX2 or DDS files; leave --filter out");
     }
-    let progress = console.progress();
     let drawn = if only_baked { Mips::Baked } else { mips };
     let (surfaces, apart) = scene_surfaces(&scene, drawn, &progress)?;
     let warnings: Vec<String> =
@@ -124,7 +129,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         Mips::Level0 => TextureFiltering::Level0,
         Mips::Filtered(_) | Mips::Baked => TextureFiltering::Mips { max_anisotropy: args.max_anisotropy },
     };
+    let preparing = progress.busy("preparing the scene");
     let prepared = view.scene(&scene, surfaces)?;
+    drop(preparing);
     painter.left_out(&view, &prepared).iter().for_each(|what| console.warn(what));
     let film = painter.film(&view, &prepared, "render", args.spp, filtering, &progress)?;
     if outputs::has_extension(&args.output, "exr") {

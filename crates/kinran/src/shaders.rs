@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use kinran_image::write_atomically;
 use kinran_shaders::{Module, SPIRV, glsl_450, glsl_es_300, hlsl, msl, wesl, wgsl, with_needs};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::table::list;
@@ -49,7 +50,7 @@ pub struct Args {
 }
 
 /// A language that the library comes in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Language {
     /// WebGPU.
@@ -90,7 +91,7 @@ impl Language {
 }
 
 /// A module, for programs.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ModuleReport {
     /// Its name.
     pub name: &'static str,
@@ -101,16 +102,19 @@ pub struct ModuleReport {
 }
 
 /// What was written, or is to be printed.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Report {
-    /// In which language.
-    pub language: Language,
+    /// In which language; `null` of a list.
+    pub language: Option<Language>,
     /// Files in the folder.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<String>,
     /// The text, where there is no folder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,
+    /// The modules, where a list was asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub modules: Vec<ModuleReport>,
 }
 
 /// The command.
@@ -124,19 +128,25 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         let cells = |m: &ModuleReport| vec![m.name.to_owned(), m.needs.join(", "), m.functions.join(", ")];
         let header = ["module", "needs", "functions"].map(str::to_owned).to_vec();
         let rows: Vec<_> = std::iter::once(header).chain(modules.iter().map(cells)).collect();
-        return console.result(&modules, &list(&rows));
+        let report = Report { language: None, files: Vec::new(), text: None, modules };
+        return console.result(&report, &list(&rows));
     };
     let chosen = chosen(language, args.module.as_deref())?;
     let Some(folder) = &args.output else {
         let text = text(language, args.module.as_deref(), &chosen)?;
-        let report = Report { language, files: Vec::new(), text: Some(text.clone()) };
+        let report = Report {
+            language: Some(language),
+            files: Vec::new(),
+            text: Some(text.clone()),
+            modules: Vec::new(),
+        };
         // The text is what was asked for, not a summary of it.
         return Console { quiet: false, ..console.clone() }.result(&report, &text);
     };
     outputs::check_folder(folder)?;
     let files = write(language, args.module.is_none(), &chosen, folder, args.force)?;
     let summary = format!("{} files are in {}", files.len(), folder.display());
-    console.result(&Report { language, files, text: None }, &summary)
+    console.result(&Report { language: Some(language), files, text: None, modules: Vec::new() }, &summary)
 }
 
 /// The modules of the library.

@@ -11,6 +11,7 @@ use kinran_bake::skin_lut::{
 };
 use kinran_image::{Texture, encode_dds, encode_ktx2, write_atomically};
 use kinran_shading::skin::profile::{Gaussian, ProfileError};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::bake::Container;
@@ -37,8 +38,10 @@ use crate::{Console, Error};
   kinran skin-lut -o tables/ --profile measured.csv
 
 A .csv has rows of distance in mm and density for red, green and blue; a .json has
-{ \"gaussians\": [ { \"variance\": 0.187, \"weight\": [0.118, 0.198, 0] } ] }, variances in mm². Both are the
-radial profile, light per area against the distance from a point.")]
+
+  { \"gaussians\": [ { \"variance\": 0.187, \"weight\": [0.118, 0.198, 0] } ] }
+
+with variances in mm². Both are the radial profile, light per area against the distance from a point.")]
 pub struct Args {
     /// Where the files go; made if it is not there
     #[arg(long, short, value_name = "DIR")]
@@ -121,8 +124,8 @@ fn table_size(text: &str) -> Result<(u32, u32), String> {
 }
 
 /// What was made.
-#[derive(Debug, Serialize)]
-struct Report {
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct Report {
     kinran: &'static str,
     profile: String,
     scale: f32,
@@ -134,7 +137,7 @@ struct Report {
 }
 
 /// A table.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct TableReport {
     files: Vec<String>,
     width: usize,
@@ -177,6 +180,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     refuse_foreign(&args.output, &all, args.force)?;
     std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
 
+    let busy = console.progress().busy("integrating tables");
     let (width, height) = (args.size.0 as usize, args.size.1 as usize);
     let range = f64::from(args.range);
     let punctual = punctual_table(radial, width, height, range);
@@ -211,6 +215,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     text.push('\n');
     write_atomically(&args.output.join(sidecar), text.as_bytes())?;
 
+    drop(busy);
     let mut lines = String::new();
     for table in &report.tables {
         let between = table

@@ -16,6 +16,7 @@ use kinran_shading::Sym2;
 use kinran_shading::skin::curvature::curvature_decode;
 use kinran_shading::skin::lighting::SKIN_NORMAL_BLUR;
 use kinran_shading::skin::profile::Gaussian;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::bake::curvature::{Blur, Joined, MethodName, deviations, meshes, unit};
@@ -43,7 +44,8 @@ use crate::{Console, Error, Progress, outputs};
 #[command(after_help = "Examples:
   kinran skin head.gltf -o head/ --unit-mm 50
   kinran skin hand.obj -o hand/ --unit-mm 1000 --sheet turn,curvature
-  kinran skin goat.obj -o goat/ --sheet tensors --curvature-method fit --curvature-blur none")]
+  kinran skin goat.obj -o goat/ --sheet tensors \\
+      --curvature-method fit --curvature-blur none")]
 pub struct Args {
     /// The .glb, .gltf or .obj file
     #[arg(value_name = "FILE")]
@@ -134,8 +136,8 @@ const TURN: [(&str, f32); 4] = [
 /// Pixels between the tensors' lines.
 const SPACING: u32 = 9;
 
-#[derive(Serialize)]
-struct Summary {
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct Summary {
     files: Vec<String>,
     warnings: Vec<String>,
 }
@@ -152,19 +154,23 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if let Some(c) = args.base.filter(|c| c.min_element() < 0.0 || c.max_element() > 1.0) {
         return Err(Error::Usage(format!("--base {},{},{}: each must lie in 0 to 1", c.x, c.y, c.z)));
     }
+    let progress = console.progress();
+    let reading = progress.busy(format!("reading {}", file_name(&args.file)));
     let mut scene = Scene::load_allowing(&args.file, args.view.model.allowed()?)?;
+    drop(reading);
     let mut warnings = scene.warnings.clone();
     if scene.materials.iter().all(|m| m.skin.is_none()) {
         scene.materials.iter_mut().for_each(|m| m.skin = Some(Skin::default()));
     }
-    let progress = console.progress();
     bake(args, &mut scene, &progress, &mut warnings)?;
 
     let mut view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
     let (surfaces, apart) = scene_surfaces(&scene, Mips::Filtered(Filter::Linear), &progress)?;
     warnings.extend(apart);
     warnings.iter().for_each(|w| console.warn(w));
+    let preparing = progress.busy("preparing the scene");
     let mut prepared = view.scene(&scene, surfaces)?;
+    drop(preparing);
     // An .obj has no colours, and white is what a glTF that says nothing gives.
     let colorless = outputs::has_extension(&args.file, "obj");
     for material in &mut prepared.materials {
@@ -184,12 +190,15 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let studio = Studio { args, scene: &scene, prepared, view, progress: &progress };
 
     std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
+    let all = progress.stage("sheets", sheets.len() as u64);
     let mut files = Vec::new();
     for &sheet in sheets {
         let name = sheet_file(sheet);
         studio.sheet(sheet)?.write(&args.output.join(&name))?;
         files.push(name);
+        all.add(1);
     }
+    drop(all);
     let text =
         format!("{} sheets of {} are in {}", files.len(), file_name(&args.file), args.output.display());
     console.result(&Summary { files, warnings }, &text)

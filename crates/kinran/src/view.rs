@@ -21,64 +21,64 @@ use crate::{Error, Progress};
 #[derive(Args, Clone, Debug)]
 pub struct ViewArgs {
     /// Pixels, WIDTHxHEIGHT
-    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = size)]
+    #[arg(long, help_heading = "Picture", value_name = "WxH", default_value = "512x512", value_parser = size)]
     pub size: (u32, u32),
 
     /// Light from all around: an equirectangular .hdr or .exr file, `studio` (built in), or `none`
-    #[arg(long, value_name = "FILE|studio|none", default_value = "studio")]
+    #[arg(long, help_heading = "Light", value_name = "FILE|studio|none", default_value = "studio")]
     pub env: EnvironmentChoice,
 
     /// Turns the environment about the vertical, degrees, counter-clockwise seen from above
-    #[arg(long, value_name = "DEG", default_value = "0", allow_negative_numbers = true,
+    #[arg(long, help_heading = "Light", value_name = "DEG", default_value = "0", allow_negative_numbers = true,
         value_parser = |t: &str| number(t, -36000.0..=36000.0))]
     pub env_rotation: f32,
 
     /// Samples of the environment's reflection for each sample of a pixel
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=1024))]
+    #[arg(long, help_heading = "Light", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=1024))]
     pub env_samples: u32,
 
     /// A directional light of pi lux from this direction; may be given several times. Without any, the
     /// file's own lights shine, and if it has none and --env is none, one from the upper left
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = direction)]
+    #[arg(long, help_heading = "Light", value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = direction)]
     pub light: Vec<Vec3>,
 
     /// Punctual lights cast hard shadows (the default)
-    #[arg(long, overrides_with = "no_shadows")]
+    #[arg(long, help_heading = "Light", overrides_with = "no_shadows")]
     pub shadows: bool,
 
     /// Punctual lights shine through everything
-    #[arg(long, overrides_with = "shadows")]
+    #[arg(long, help_heading = "Light", overrides_with = "shadows")]
     pub no_shadows: bool,
 
     /// Behind everything: `env`, `env:DEG` blurred by that half angle, or a linear colour R,G,B. The
     /// default is dark grey, and env where an environment's file is given
-    #[arg(long, value_name = "env|R,G,B", allow_hyphen_values = true, value_parser = background)]
+    #[arg(long, help_heading = "Picture", value_name = "env|R,G,B", allow_hyphen_values = true, value_parser = background)]
     pub background: Option<Background>,
 
     /// The file's own camera N, from 0. By default the whole model is framed
-    #[arg(long, value_name = "N", conflicts_with_all = ["from", "fov"])]
+    #[arg(long, help_heading = "Camera", value_name = "N", conflicts_with_all = ["from", "fov"])]
     pub camera: Option<usize>,
 
     /// The direction from the model to the camera, +Y up
-    #[arg(long, value_name = "X,Y,Z", default_value = "0.35,0.3,1", allow_hyphen_values = true,
+    #[arg(long, help_heading = "Camera", value_name = "X,Y,Z", default_value = "0.35,0.3,1", allow_hyphen_values = true,
         value_parser = direction)]
     pub from: Vec3,
 
     /// Vertical field of view, degrees
-    #[arg(long, value_name = "DEG", default_value = "30", value_parser = |t: &str| number(t, 0.1..=170.0))]
+    #[arg(long, help_heading = "Camera", value_name = "DEG", default_value = "30", value_parser = |t: &str| number(t, 0.1..=170.0))]
     pub fov: f32,
 
     /// Moves the camera away from the model's middle by this factor
-    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = |t: &str| number(t, 0.01..=10000.0))]
+    #[arg(long, help_heading = "Camera", value_name = "FACTOR", default_value = "1", value_parser = |t: &str| number(t, 0.01..=10000.0))]
     pub distance: f32,
 
     /// Exposure in stops
-    #[arg(long, value_name = "EV", default_value = "0", allow_negative_numbers = true,
+    #[arg(long, help_heading = "Picture", value_name = "EV", default_value = "0", allow_negative_numbers = true,
         value_parser = |t: &str| number(t, -32.0..=32.0))]
     pub exposure: f32,
 
     /// The tone curve of pictures for displays; EXR files are linear and not exposed
-    #[arg(long, value_enum, default_value_t = Curve::Aces)]
+    #[arg(long, help_heading = "Picture", value_enum, default_value_t = Curve::Aces)]
     pub tonemap: Curve,
 
     #[command(flatten)]
@@ -90,7 +90,7 @@ pub struct ViewArgs {
     pub skin: SkinArgs,
 
     /// What is shown of maps that are blended from tiles
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, help_heading = "Picture", value_enum, default_value_t)]
     pub detail: DetailName,
 }
 
@@ -157,11 +157,11 @@ pub enum EnvironmentChoice {
 /// A tone curve's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Curve {
-    /// ACES filmic.
+    /// ACES filmic
     Aces,
-    /// AgX, base look.
+    /// AgX, base look
     Agx,
-    /// Clamped.
+    /// Clamped
     None,
 }
 

@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex};
 
 use eframe::egui;
 use kinran_render::realtime::{ShaderSource, wanted_features};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::Place;
@@ -32,9 +33,9 @@ use parameters::Parameters;
   kinran view lamp.glb
   kinran view lamp.glb --env studio.hdr --light 1,2,1
   kinran view lamp.glb --parameters lamp.view.json
-  kinran view lamp.glb --shaders my_shaders/     edit a shader there, and see it at once")]
+  kinran view lamp.glb --shaders my_shaders/     edit a shader, see it at once")]
 pub struct Args {
-    /// The .glb or .gltf file, or a folder that holds one, or the textures that `kinran bake` wrote; may also be dropped later
+    /// The .glb, .gltf or .obj file, or a folder that holds one, or the textures that `kinran bake` wrote; may also be dropped later
     #[arg(value_name = "FILE")]
     pub file: Option<PathBuf>,
 
@@ -120,7 +121,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     created.map_err(|e| {
         let fix = "a window needs a display and a Vulkan driver (in Debian, mesa-vulkan-drivers); without them use \
                    `kinran render`";
-        Error::Usage(format!("no window can be opened: {e}; {fix}"))
+        Error::Usage(format!("no window can be opened: {}; {fix}", without_source(&e.to_string())))
     })?;
     let Some(path) = &args.screenshot else { return Ok(()) };
     outcome.warnings.iter().for_each(|warning| console.warn(warning));
@@ -134,11 +135,33 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         .result(&summary, &format!("{}: the first picture came {seconds:.2} s after reading", path.display()))
 }
 
-#[derive(Serialize)]
-struct Summary {
+/// An error without the place in a crate's source that winit puts before it: "os error at …/mod.rs:786: ".
+fn without_source(message: &str) -> &str {
+    match message.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")) {
+        Some((_, reason)) => reason,
+        None => message,
+    }
+}
+
+/// What `--screenshot` took.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct Summary {
     screenshot: String,
     /// From the model's being read to its first picture.
     first_picture_seconds: f64,
     /// What of the model is drawn otherwise than it says.
     warnings: Vec<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_source;
+
+    #[test]
+    fn an_error_says_nothing_of_a_crate_s_source() {
+        let of_winit =
+            "winit EventLoopError: os error at /root/.cargo/winit-0.30.13/src/linux/mod.rs:786: no display";
+        assert_eq!(without_source(of_winit), "no display");
+        assert_eq!(without_source("no adapter: none"), "no adapter: none");
+    }
 }

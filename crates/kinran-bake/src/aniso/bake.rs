@@ -9,6 +9,7 @@ use kinran_image::{
 };
 use kinran_shading::Sym2;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::footprint::{Kernel, Taps, footprints};
@@ -40,7 +41,7 @@ pub struct SurfaceOptions {
 }
 
 /// What one level lost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct LevelError {
     /// Texels in a row.
     pub width: u32,

@@ -113,7 +113,7 @@ pub enum CurvatureError {
 }
 
 /// What was found in a mesh, and left out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 pub struct Report {
     /// Vertices given.
     pub vertices: usize,

@@ -5,6 +5,7 @@ use kinran_image::{Encoding, Error, Format, Texture};
 use kinran_scene::Wrap;
 use kinran_shading::normal_from_xy;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::layer::{DetailRows, Layer, RowRoom, Seen, texture_bytes};
@@ -13,7 +14,7 @@ use super::sample::Fetch;
 use super::solve::{Blend, DetailOptions, Solved, Sums, Target, blend, solve, solve_levels, squared_error};
 
 /// Errors of one level by method, each as [`LevelError::error`](super::LevelError::error).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct LevelComparison {
     /// Texels in a row.
     pub width: u32,
@@ -34,7 +35,7 @@ pub struct LevelComparison {
 /// Errors of the finest level where it is magnified twice, and the tiles are seen twice as fine: against the exact
 /// solution, not compressed and magnified likewise, over the tiles as authored; the compressed target against the target
 /// magnified likewise. In the unit of [`LevelError::error`](super::LevelError::error), over every fourth row.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct MagnifiedComparison {
     /// The target itself, compressed; no detail.
     pub target: f32,
@@ -45,7 +46,7 @@ pub struct MagnifiedComparison {
 }
 
 /// A target with and without its tiles, and what they cost.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Comparison {
     /// Finest level first.
     pub levels: Vec<LevelComparison>,
@@ -165,7 +166,7 @@ fn vector(planes: &Planes, kind: MapKind, x: usize, y: usize) -> Vec3 {
 }
 
 /// What `s` at a lower resolution would cost.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Resolution {
     /// Texels in a row of its finest level.
     pub width: u32,

@@ -11,6 +11,7 @@ use kinran_shading::detail::{
 };
 use kinran_shading::normal_from_xy;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::choose::{ChooseBand, Stored, can_choose, makes_its_own};
@@ -230,7 +231,7 @@ impl Target {
 }
 
 /// What one level of `s` became.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct LevelError {
     /// Texels in a row.
     pub width: u32,

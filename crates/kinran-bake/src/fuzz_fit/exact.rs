@@ -5,10 +5,11 @@ use std::sync::LazyLock;
 
 use glam::DVec3;
 use kinran_shading::fuzz::velvet_normalization;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// How fibres scatter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Phase {
     /// SGGX fibres, `kinran_shading::fuzz::fibre_phase`.

@@ -12,6 +12,7 @@ use std::sync::LazyLock;
 
 use glam::{DVec3, dvec3};
 use kinran_shading::fuzz::{fuzz_alpha, fuzz_g, fuzz_p_s, velvet_k};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 pub use exact::{
@@ -30,10 +31,11 @@ pub const DENSITIES: [f64; 5] = [0.05, 0.1, 0.2, 0.35, 0.5];
 pub const N_V_MIN: f64 = 0.1;
 
 /// Coefficients and what they are off by.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Fitted<const N: usize> {
     /// In the order of the shader function.
     #[serde(serialize_with = "array")]
+    #[schemars(with = "Vec<f32>")]
     pub coefficients: [f32; N],
     /// Largest difference from the exact value over the range of the fit.
     pub max_error: f32,
@@ -48,7 +50,7 @@ fn array<S: serde::Serializer, const N: usize>(values: &[f32; N], serializer: S)
 }
 
 /// All fits of one tilt and one spread.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FuzzFit {
     /// How fibres scatter.
     pub phase: Phase,

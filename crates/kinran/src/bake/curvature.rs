@@ -8,6 +8,7 @@ use kinran_bake::curvature::{
 };
 use kinran_image::{Channels, Image, Pixels, write_atomically, write_exr};
 use kinran_scene::{Attribute, Document, Primitive, Scene, Skin};
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -119,7 +120,7 @@ impl CurvatureArgs {
 }
 
 /// Curvature of one mesh.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct CurvatureReport {
     /// The mesh.
     pub mesh: String,

@@ -6,7 +6,7 @@ use kinran_bake::{bake_plain, pack_channels};
 use kinran_image::{Image, Role, Transfer, full_level_count, image_size, level_size};
 use rayon::prelude::*;
 
-use super::report::hash_file;
+use super::report::{BakeReport, hash_file};
 use super::{
     Args, Form, Input, Output, Report, SurfaceReport, file_name, file_stem, role_of, sheet_format,
     texture_files, texture_space, write_texture,
@@ -17,16 +17,21 @@ use crate::{Console, Error};
 
 /// Bakes a folder and tells what came of it.
 pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    let table = scan(&args.input, &args.hints())?.table();
+    let folder = scan(&args.input, &args.hints())?;
     let reports = bake_folder(args, console)?;
     let files: String = reports.iter().map(|report| report.text(args.output())).collect();
-    console.result(&reports, &format!("{table}\n{files}"))
+    let text = format!("{}\n{files}", folder.table());
+    console.result(&BakeReport::new(args, folder.rows, reports), &text)
 }
 
 /// Tells what was understood of a folder.
 pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
     let folder = scan(&args.input, &args.hints())?;
-    console.result(&folder, &folder.table())
+    let mut report = Report::new(args);
+    let names = folder.materials.iter().map(|material| material.name.clone());
+    report.surfaces = names.map(SurfaceReport::new).collect();
+    let text = folder.table();
+    console.result(&BakeReport::new(args, folder.rows, vec![report]), &text)
 }
 
 /// Bakes every material found in a folder.
@@ -38,7 +43,9 @@ pub fn bake_folder(args: &Args, console: &Console) -> Result<Vec<Report>, Error>
     check(args, console, &materials)?;
     let mut reports = Vec::new();
     for maps in &materials {
+        let reading = console.progress().busy(format!("reading {}", maps.name));
         let loaded = maps.load()?;
+        drop(reading);
         for note in &loaded.notes {
             console.warn(note);
         }
@@ -162,6 +169,8 @@ fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> R
             .sum();
         let stage = console.progress().stage(format!("{} {name}", args.filter.name()), texels);
         let baked = bake_surface(maps, args.options(), &requests, &|texels| stage.add(texels))?;
+        drop(stage);
+        let _busy = console.progress().busy(format!("writing {name}"));
         report.levels = baked.levels;
         let written: Vec<Vec<Output>> = (sheets.par_iter().zip(baked.textures))
             .map(|(&(_, map), texture)| write_texture(args, &format!("{name}_{}", map.name()), map, texture))
@@ -179,6 +188,7 @@ fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> R
     }
 
     if let Some(color) = material.images.iter().find(|map| map.role == MapRole::Color) {
+        let _busy = console.progress().busy(format!("color {name}"));
         let encoding = args.encoding(Role::Color, args.color_format);
         let texture = bake_plain(&color.image, Transfer::Srgb, encoding, args.options().kernel, args.wrap())?;
         report.outputs.extend(write_texture(args, &format!("{name}_color"), Content::Color, texture)?);

@@ -11,6 +11,7 @@ use kinran_image::{
 use kinran_scene::{Document, FUZZ_EXTENSION, Material, Scene, Slot, TextureExtension, TextureRef};
 use serde_json::Value;
 
+use super::report::BakeReport;
 use super::{
     Args, Form, Input, Output, Report, SurfaceReport, curvature, file_name, file_stem, role_of, sheet_format,
     texture_files, texture_space, write_texture,
@@ -26,7 +27,8 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
         console.warn(warning);
     }
     let model = args.output().join(file_name(&args.input));
-    console.result(&report, &format!("{}{}\n", report.text(args.output()), model.display()))
+    let text = format!("{}{}\n", report.text(args.output()), model.display());
+    console.result(&BakeReport::new(args, Vec::new(), vec![report]), &text)
 }
 
 /// Bakes every material of a glTF file that has a normal or an anisotropy map.
@@ -45,7 +47,9 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
             args.input.display()
         )));
     }
+    let reading = console.progress().busy(format!("reading {}", file_name(&args.input)));
     let (_files, scene, mut document) = read(args)?;
+    drop(reading);
     let mut report = Report::new(args);
     let surfaces = surfaces(args, &scene, &document, &mut report);
     let stem = args.input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
@@ -59,7 +63,9 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
         let mut baker = SurfaceBaker { args, console, scene: &scene, document, name, written };
         report.surfaces.push(baker.bake(materials, surface, planned)?);
     }
+    let colors = console.progress().busy("colour, emission, occlusion");
     bake_colors(args, &scene, &mut document, &plan.colors, &mut report)?;
+    drop(colors);
     report.curvature = curvature::bake(args, console, &scene, &mut document, &mut report.warnings)?;
 
     for (i, material) in scene.materials.iter().enumerate().take(document.material_count()) {
@@ -71,6 +77,7 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
             document.use_extension("KHR_materials_sheen", false);
         }
     }
+    let _busy = console.progress().busy(format!("writing {}", file_name(&output)));
     let packed = document.pack(&output)?;
     packed.write()?;
     report.warnings.extend(packed.warnings);
@@ -392,10 +399,12 @@ impl SurfaceBaker<'_> {
             .sum();
         let stage = self.console.progress().stage(format!("{} {}", args.filter.name(), m.name), texels);
         let baked = bake_surface(maps, args.options(), &requests, &|texels| stage.add(texels))?;
+        drop(stage);
+        let _busy = self.console.progress().busy(format!("writing {}", m.name));
 
         let mut report = SurfaceReport {
             name: m.name.clone(),
-            inputs: self.inputs(materials[0])?,
+            inputs: inputs(self.scene, self.document, materials[0])?,
             outputs: Vec::new(),
             levels: baked.levels,
         };
@@ -472,18 +481,19 @@ impl SurfaceBaker<'_> {
             }
         }
     }
+}
 
-    fn inputs(&self, material: usize) -> Result<Vec<Input>, Error> {
-        let m = &self.scene.materials[material];
-        let anisotropy = m.anisotropy.as_ref().and_then(|a| a.texture.as_ref());
-        let roughness = m.metallic_roughness.as_ref();
-        [("normal", m.normal.as_ref()), ("metallicRoughness", roughness), ("anisotropy", anisotropy)]
-            .into_iter()
-            .filter_map(|(role, place)| Some((role, place?)))
-            .filter_map(|(role, place)| Some((role, place, self.scene.images[place.image].as_ref()?)))
-            .map(|(role, place, image)| input(self.document, place.image, role, image))
-            .collect()
-    }
+/// The maps of a material's surface.
+fn inputs(scene: &Scene, document: &Document, material: usize) -> Result<Vec<Input>, Error> {
+    let m = &scene.materials[material];
+    let anisotropy = m.anisotropy.as_ref().and_then(|a| a.texture.as_ref());
+    let roughness = m.metallic_roughness.as_ref();
+    [("normal", m.normal.as_ref()), ("metallicRoughness", roughness), ("anisotropy", anisotropy)]
+        .into_iter()
+        .filter_map(|(role, place)| Some((role, place?)))
+        .filter_map(|(role, place)| Some((role, place, scene.images[place.image].as_ref()?)))
+        .map(|(role, place, image)| input(document, place.image, role, image))
+        .collect()
 }
 
 fn input(document: &Document, index: usize, role: &str, image: &Image) -> Result<Input, Error> {
@@ -610,32 +620,22 @@ fn bake_colors(
 
 /// Says which materials would be baked from what.
 pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
-    #[derive(serde::Serialize)]
-    struct Row<'a> {
-        materials: Vec<&'a str>,
-        width: u32,
-        height: u32,
-        anisotropic: bool,
-    }
+    let reading = console.progress().busy(format!("reading {}", file_name(&args.input)));
     let (_files, scene, document) = read(args)?;
+    drop(reading);
     let mut report = Report::new(args);
-    let surfaces = surfaces(args, &scene, &document, &mut report);
-    let rows: Vec<Row> = surfaces
-        .iter()
-        .map(|(_, materials, surface)| Row {
-            materials: materials.iter().map(|&i| scene.materials[i].name.as_str()).collect(),
-            width: surface.maps.size().0,
-            height: surface.maps.size().1,
-            anisotropic: matches!(surface.maps.roughness, RoughnessMaps::Khr { .. }),
-        })
-        .collect();
     let mut text = String::new();
-    for row in &rows {
-        let kind = if row.anisotropic { "anisotropic" } else { "isotropic" };
-        text += &format!("{}x{} {kind}: {}\n", row.width, row.height, row.materials.join(", "));
+    for (_, materials, surface) in &surfaces(args, &scene, &document, &mut report) {
+        let directed = matches!(surface.maps.roughness, RoughnessMaps::Khr { .. });
+        let kind = if directed { "anisotropic" } else { "isotropic" };
+        let names: Vec<&str> = materials.iter().map(|&i| scene.materials[i].name.as_str()).collect();
+        let (width, height) = surface.maps.size();
+        text += &format!("{width}x{height} {kind}: {}\n", names.join(", "));
+        let inputs = inputs(&scene, &document, materials[0])?;
+        report.surfaces.push(SurfaceReport { inputs, ..SurfaceReport::new(names[0].to_owned()) });
     }
     for warning in &report.warnings {
         console.warn(warning);
     }
-    console.result(&rows, &text)
+    console.result(&BakeReport::new(args, Vec::new(), vec![report]), &text)
 }

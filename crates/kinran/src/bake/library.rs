@@ -17,6 +17,7 @@ use kinran_bake::stamps::{Stamp, Stamps};
 use kinran_image::{write_atomically, write_atomically_in};
 use kinran_scene::Document;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::inputs::{Snapshot, Sources};
@@ -63,7 +64,7 @@ pub struct LibraryArgs {
 }
 
 /// What became of an entry.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// Its files were there already.
@@ -94,7 +95,7 @@ impl Status {
 }
 
 /// One entry of the manifest.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct EntryReport {
     /// The input.
     pub name: String,
@@ -113,7 +114,7 @@ pub struct EntryReport {
 }
 
 /// What a run over a manifest did.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LibraryReport {
     /// Where the files are.
     pub output: PathBuf,
@@ -307,7 +308,7 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
 
     // Bake the rest, some at a time. Threads of their own and not tasks of the pool: a thread of the pool that
     // waits for a part of one entry would begin another one meanwhile, and hold both in memory.
-    let bars = console.progress().grouped();
+    let bars = console.progress();
     let stage = bars.stage("baking", todo.len() as u64);
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<(usize, EntryReport, Key)>> = Mutex::new(Vec::new());

@@ -1,9 +1,11 @@
 //! The sidecar: how textures were made and what was lost.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use kinran_bake::aniso::LevelError;
+use kinran_bake::folder::Row;
 use kinran_image::{Format, Texture, Transfer, write_atomically};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::Error;
@@ -11,7 +13,7 @@ use crate::content::Content;
 use crate::outputs::WrittenFile;
 
 /// A file that went in.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Input {
     /// Its name.
     pub file: String,
@@ -26,7 +28,7 @@ pub struct Input {
 }
 
 /// A file that came out.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Output {
     /// Its name, beside the report.
     pub file: String,
@@ -73,7 +75,7 @@ impl Output {
 }
 
 /// One surface's textures.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SurfaceReport {
     /// The material, or the first one that uses the surface.
     pub name: String,
@@ -85,8 +87,15 @@ pub struct SurfaceReport {
     pub levels: Vec<LevelError>,
 }
 
+impl SurfaceReport {
+    /// A surface of which nothing is known yet.
+    pub(super) fn new(name: String) -> Self {
+        SurfaceReport { name, inputs: Vec::new(), outputs: Vec::new(), levels: Vec::new() }
+    }
+}
+
 /// What one run baked.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Report {
     /// Kinran's version.
     pub kinran: &'static str,
@@ -153,6 +162,46 @@ impl Report {
             bytes as f64 / 1024.0,
             folder.display()
         )
+    }
+}
+
+/// What `kinran bake` made of a folder or a model, or with `--dry-run` would make.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct BakeReport {
+    /// Kinran's version.
+    pub(super) kinran: &'static str,
+    /// Where the files are.
+    pub(super) output: PathBuf,
+    /// Nothing was baked: surfaces have neither outputs nor levels.
+    pub(super) dry_run: bool,
+    /// The filter's name.
+    pub(super) filter: &'static str,
+    /// The footprint's shape.
+    pub(super) kernel: String,
+    /// Of a folder: every image file, and what was understood of it.
+    pub(super) files: Vec<Row>,
+    /// The surfaces.
+    pub(super) surfaces: Vec<SurfaceReport>,
+    /// Curvature of meshes.
+    pub(super) curvature: Vec<super::CurvatureReport>,
+    /// What was left out or assumed, a sentence each.
+    pub(super) warnings: Vec<String>,
+}
+
+impl BakeReport {
+    pub(super) fn new(args: &super::Args, files: Vec<Row>, reports: Vec<Report>) -> Self {
+        let Report { kinran, filter, kernel, .. } = Report::new(args);
+        let output = args.output().to_path_buf();
+        let (surfaces, curvature, warnings) = (Vec::new(), Vec::new(), Vec::new());
+        let dry_run = args.dry_run;
+        let mut all =
+            BakeReport { kinran, output, dry_run, filter, kernel, files, surfaces, curvature, warnings };
+        for report in reports {
+            all.surfaces.extend(report.surfaces);
+            all.curvature.extend(report.curvature);
+            all.warnings.extend(report.warnings);
+        }
+        all
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec2;
 use kinran_bake::aniso::{
@@ -9,13 +10,14 @@ use kinran_bake::aniso::{
     bake_surface,
 };
 use kinran_bake::detail::{
-    Comparison, DetailOptions, Layer, LayerTransform, MapKind, Mask, Paint, PaintGuides, Target, Tile,
-    TileOptions, bearable_opacity, compare, level_pictures,
+    Comparison, DetailOptions, FADE_TRIALS, Layer, LayerTransform, MapKind, Mask, Paint, PaintGuides, Target,
+    Tile, TileOptions, bearable_opacity, compare, level_pictures,
 };
 use kinran_bake::folder::{Green, Role, named_maps};
 use kinran_image::{Channels, Encoding, Image, Level, Pixels, encode_png, read_image, write_atomically};
 use kinran_scene::Wrap;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{BlockFormat, KindName, page};
@@ -35,7 +37,8 @@ use crate::{Console, Error};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran detail report materials/ -o report/
-  kinran detail report materials/ -o report/ --format bc1 --kind color --size 512")]
+  kinran detail report materials/ -o report/ \\
+      --format bc1 --kind color --size 512")]
 pub struct LibraryArgs {
     /// A folder of folders of maps
     #[arg(value_name = "FOLDER")]
@@ -105,7 +108,7 @@ impl Material {
 }
 
 /// Which tiles a target was solved against.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Against {
     /// Those it was painted over.
@@ -128,7 +131,7 @@ impl Against {
 }
 
 /// One target solved in one way.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LibraryRow {
     /// The material that the target was painted over.
     pub material: String,
@@ -147,7 +150,7 @@ pub struct LibraryRow {
 }
 
 /// Means of one kind of rows at one level.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LibraryMean {
     /// Which maps.
     pub map: String,
@@ -180,7 +183,7 @@ pub struct LibraryMean {
 }
 
 /// The whole report.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct LibraryReport {
     /// Side of the targets.
     pub size: u32,
@@ -208,23 +211,23 @@ pub fn report_library(args: &LibraryArgs, console: &Console) -> Result<LibraryRe
     let pictures = args.output.join("pictures");
     let folder = if args.no_pictures { &args.output } else { &pictures };
     std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
-    let total: usize =
-        materials.iter().map(|m| m.maps.iter().filter(|map| map.is_target(args)).count()).sum();
-    let stage = console.progress().stage("painting and solving", total as u64);
+    let of_map = |map: &MapFile| formats_of(map, &formats).len() as u64 * texels(args, map);
+    let targets = materials.iter().flat_map(|m| m.maps.iter().filter(|map| map.is_target(args)));
+    let stage = console.progress().stage("painting and solving", targets.map(of_map).sum());
     let mut report = LibraryReport { size: args.size, means: Vec::new(), rows: Vec::new() };
     for (i, material) in materials.iter().enumerate() {
         for map in material.maps.iter().filter(|map| map.is_target(args)) {
-            let grey = matches!(map.image.channels, Channels::R | Channels::Rg);
-            let formats = match map.kind {
-                MapKind::Normal => &[BlockFormat::Bc5][..],
-                MapKind::Data if grey => &[BlockFormat::Bc4][..],
-                _ => &formats,
-            };
-            for (n, format) in formats.iter().enumerate() {
+            for (n, format) in formats_of(map, &formats).iter().enumerate() {
                 let shown = (!args.no_pictures && n == 0).then_some(pictures.as_path());
-                report.rows.extend(solve_map(args, &materials, i, map, *format, shown)?);
+                let done = AtomicU64::new(0);
+                let progress = |texels| {
+                    done.fetch_add(texels, Ordering::Relaxed);
+                    stage.add(texels);
+                };
+                report.rows.extend(solve_map(args, &materials, i, map, *format, shown, &progress)?);
+                // What turned out not to be needed.
+                stage.add(texels(args, map).saturating_sub(done.into_inner()));
             }
-            stage.add(1);
         }
     }
     drop(stage);
@@ -235,6 +238,25 @@ pub fn report_library(args: &LibraryArgs, console: &Console) -> Result<LibraryRe
     Ok(report)
 }
 
+/// The formats that a map is solved in, of those asked for.
+fn formats_of<'a>(map: &MapFile, formats: &'a [BlockFormat]) -> &'a [BlockFormat] {
+    match map.kind {
+        MapKind::Normal => &[BlockFormat::Bc5],
+        MapKind::Data if matches!(map.image.channels, Channels::R | Channels::Rg) => &[BlockFormat::Bc4],
+        _ => formats,
+    }
+}
+
+/// Texels that are solved for a map in one format, at most: three comparisons of five solutions with their mips, and the
+/// trials of an opacity at two levels.
+fn texels(args: &LibraryArgs, map: &MapFile) -> u64 {
+    let level = u64::from(args.size) * u64::from(args.size);
+    match args.no_fade || map.kind == MapKind::Aniso {
+        true => 2 * 5 * level * 4 / 3,
+        false => 3 * 5 * level * 4 / 3 + FADE_TRIALS * level * 5 / 4,
+    }
+}
+
 /// Paints one target and solves it against its own tiles and against another's.
 fn solve_map(
     args: &LibraryArgs,
@@ -243,6 +265,7 @@ fn solve_map(
     map: &MapFile,
     format: BlockFormat,
     pictures: Option<&Path>,
+    progress: &(impl Fn(u64) + Sync),
 ) -> Result<Vec<LibraryRow>, Error> {
     let material = &materials[index];
     let encoding = format.encoding();
@@ -299,7 +322,7 @@ fn solve_map(
     let options = DetailOptions::new(encoding);
     let mut rows = Vec::new();
     let mut solve = |layers: &[Layer], tiles: Vec<String>, against: Against| -> Result<(), Error> {
-        let (comparison, solved) = compare(&target, layers, &options, &|_| {})?;
+        let (comparison, solved) = compare(&target, layers, &options, progress)?;
         if let Some(folder) = pictures {
             let shown = level_pictures(&target, layers, &options, &solved, 1)?;
             let side = 256.min(args.size / 2);
@@ -340,7 +363,7 @@ fn solve_map(
         // An aniso map has an opacity of its own.
         if !args.no_fade
             && map.kind != MapKind::Aniso
-            && let Some(opacity) = bearable_opacity(&target, &[layer], &options, &|_| {})?
+            && let Some(opacity) = bearable_opacity(&target, &[layer], &options, progress)?
         {
             solve(&[Layer { opacity, ..layer }], name, Against::Faded)?;
         }

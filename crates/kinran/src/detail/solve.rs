@@ -9,6 +9,7 @@ use kinran_bake::detail::{
     Solved, Target, Tile, TileOptions, bearable_opacity, compare, level_pictures, lowest_resolution, solve,
 };
 use kinran_image::{Image, encode_dds, encode_ktx2, encode_png, read_image, read_texture, write_atomically};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::layer_flag::layer_flag;
@@ -34,18 +35,23 @@ use crate::{Console, Error};
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran detail solve helmet_color.png --layer steel.png,scale=4 -o baked/
-  kinran detail solve wall.png --layer brick.png,scale=6 --layer moss.png,scale=9,mask=masks.png,channel=g -o baked/
-  kinran detail solve wall_normal.png --kind normal --layer brick_normal.png,scale=6 -o baked/
-  kinran detail solve wall.png --layer brick.png,scale=6 --max-error 4 -o baked/ --pictures
-  kinran detail solve wall.png --layer brick.png,scale=6 -o baked/ --board && kinran view baked/wall.glb
-  kinran detail solve helmet.png --layer steel.png,scale=9 -o baked/ --model helmet.glb --material shell")]
+  kinran detail solve wall.png --layer brick.png,scale=6 \\
+      --layer moss.png,scale=9,mask=masks.png,channel=g -o baked/
+  kinran detail solve wall_normal.png --kind normal \\
+      --layer brick_normal.png,scale=6 -o baked/
+  kinran detail solve wall.png --layer brick.png,scale=6 \\
+      --max-error 4 -o baked/ --pictures
+  kinran detail solve wall.png --layer brick.png,scale=6 -o baked/ --board && \\
+      kinran view baked/wall.glb
+  kinran detail solve helmet.png --layer steel.png,scale=9 -o baked/ \\
+      --model helmet.glb --material shell")]
 pub struct SolveArgs {
     /// The map to reproduce: an image of 8 or 16 bits or floats
     #[arg(value_name = "TARGET")]
     pub target: PathBuf,
 
-    /// A tiled layer, from the bottom up; up to three
-    #[arg(long, value_name = "FILE[,NAME=VALUE]...", required = true, value_parser = layer_flag)]
+    /// A tiled layer, FILE[,NAME=VALUE]..., from the bottom up; up to three
+    #[arg(long, value_name = "LAYER", required = true, value_parser = layer_flag)]
     pub layer: Vec<LayerFlag>,
 
     /// Where the files go; made if it is not there
@@ -150,7 +156,7 @@ pub struct SolveArgs {
 }
 
 /// What was solved and how well.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SolveReport {
     /// File name of the target.
     pub target: String,
@@ -316,6 +322,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         (solve(&target, &layers, &options, &|n| stage.add(n))?, None)
     };
 
+    let _busy = console.progress().busy("writing");
     let stem = file_stem(&args.target);
     let mut files = write_textures(args, &stem, &solved, &tiles)?;
     if args.board || args.model.is_some() {

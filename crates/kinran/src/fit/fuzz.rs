@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use kinran_bake::fuzz_fit::{AmbientTable, Fitted, FuzzFit, Phase, TABLE_SIZE, ambient_table, fuzz_fit};
 use kinran_image::{Channels, Image, Pixels, write_atomically, write_exr};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::fuzz_plots::phase_plots;
@@ -72,17 +73,19 @@ pub enum FuzzLanguage {
     Glsl,
 }
 
-#[derive(Serialize)]
-struct Report<'a> {
+/// What was fitted.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct FuzzReport {
+    /// The coefficients.
     #[serde(flatten)]
-    fit: &'a FuzzFit,
+    fit: FuzzFit,
     /// The table's smallest and largest value over the exact one.
     #[serde(skip_serializing_if = "Option::is_none")]
     table: Option<[f32; 2]>,
     /// [`FuzzFit::returned`].
     returned: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    warning: Option<&'a str>,
+    warning: Option<String>,
 }
 
 /// The command.
@@ -97,6 +100,7 @@ pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
         PhaseName::Velvet => Phase::Velvet,
     };
     let (tilt, spread) = (f64::from(args.tilt).to_radians(), f64::from(args.spread));
+    let busy = console.progress().busy("fitting");
     // As typed, not as radians make it.
     let fit = FuzzFit { tilt: args.tilt, ..fuzz_fit(phase, tilt, spread) };
     let tabulated = match &args.table {
@@ -110,6 +114,7 @@ pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
     if let Some(path) = &args.plots {
         write_atomically(path, phase_plots(&fit).as_bytes())?;
     }
+    drop(busy);
     let returned = fit.returned();
     let warning = (returned > 1.0).then(|| {
         let instead = match phase {
@@ -120,8 +125,7 @@ pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
             "the coefficients of p_s make energy: white fibres over white send back up to {returned:.3} of a light{instead}"
         )
     });
-    let warning = warning.as_deref();
-    let report = Report { fit: &fit, table: tabulated, returned, warning };
+    let report = FuzzReport { fit, table: tabulated, returned, warning };
     match args.lang {
         // Constants are what was asked for, not a summary of it.
         Some(language) => {

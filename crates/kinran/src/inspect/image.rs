@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::{Vec3, Vec4};
 use kinran_image::{Channels, Image, Pixels, read_image};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::statistics::Range;
@@ -14,8 +15,8 @@ use crate::{Console, Error};
 /// A normal's length may be off by this much: three steps of 8 bits.
 const LENGTH_TOLERANCE: f32 = 3.0 * 2.0 / 255.0;
 
-#[derive(Serialize)]
-struct Report {
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct Report {
     file: String,
     kind: &'static str,
     width: u32,
@@ -28,14 +29,14 @@ struct Report {
     normal_map: Option<NormalReport>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct ChannelReport {
     name: &'static str,
     #[serde(flatten)]
     range: Range,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct NormalReport {
     /// Share of texels whose length is not 1.
     not_unit_share: f32,
@@ -70,7 +71,8 @@ pub(super) fn inspect(path: &Path, console: &Console) -> Result<(), Error> {
         channels: names.iter().filter_map(channel).collect(),
         normal_map: normal_report(&image),
     };
-    console.result(&report, &text(&report))
+    let text = text(&report);
+    console.result(&super::Report::Image(report), &text)
 }
 
 fn texels(image: &Image) -> impl Iterator<Item = Vec4> {

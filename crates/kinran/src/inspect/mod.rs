@@ -8,14 +8,18 @@ mod texture;
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::content::Content;
 use crate::model::ModelArgs;
+use crate::view::file_name;
 use crate::{Console, Error, outputs};
 
 /// Tells what is in a texture, a model, an image or a report
 ///
 /// .ktx2 and .dds: format, transfer function, size, key/values, and statistics of every level that suit
-/// what the map holds. .glb and .gltf: geometry, materials, what `kinran bake` would do with them,
+/// what the map holds. .glb, .gltf and .obj: geometry, materials, what `kinran bake` would do with them,
 /// extensions, warnings. .png, .jpg, .tga, .tif, .hdr and .exr: size, channels, ranges, and whether what
 /// looks like a normal map is one. .json: what a report of `kinran` says, and whether the files that it names are as
 /// they were written.
@@ -40,6 +44,16 @@ pub struct Args {
     pub model: ModelArgs,
 }
 
+/// What is in a file; `kind` says which of these.
+#[derive(Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(crate) enum Report {
+    Texture(texture::Report),
+    Model(model::Report),
+    Image(image::Report),
+    Written(report::Report),
+}
+
 /// Extensions of image files that are read.
 const IMAGES: [&str; 8] = ["png", "jpg", "jpeg", "tga", "tif", "tiff", "hdr", "exr"];
 
@@ -48,6 +62,7 @@ const IMAGES: [&str; 8] = ["png", "jpg", "jpeg", "tga", "tif", "tiff", "hdr", "e
 /// # Errors
 /// One that names the file: it cannot be read, it is damaged, it is of another kind.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    let _busy = console.progress().busy(format!("looking at {}", file_name(&args.file)));
     let is = |extensions: &[&str]| extensions.iter().any(|e| outputs::has_extension(&args.file, e));
     if is(&["ktx2", "dds"]) {
         return texture::inspect(&args.file, args.role, console);
@@ -59,7 +74,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             role.name()
         )));
     }
-    if is(&["glb", "gltf"]) {
+    if is(&["glb", "gltf", "obj"]) {
         model::inspect(&args.file, args.model.allowed()?, console)
     } else if is(&IMAGES) {
         image::inspect(&args.file, console)
@@ -67,7 +82,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         report::inspect(&args.file, console)
     } else {
         Err(Error::Usage(format!(
-            "{}: this kind of file is not known; give a .ktx2, .dds, .glb, .gltf, a report of kinran (.json) or an image (.{})",
+            "{}: this kind of file is not known; give a .ktx2, .dds, .glb, .gltf, .obj, a report of kinran (.json) or an image (.{})",
             args.file.display(),
             IMAGES.join(", .")
         )))

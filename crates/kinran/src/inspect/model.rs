@@ -6,15 +6,16 @@ use kinran_bake::aniso::RoughnessMaps;
 use kinran_bake::{NoSurface, material_surface};
 use kinran_image::{Pixels, full_level_count};
 use kinran_scene::{Document, LightKind, Material, Scene, TextureRef};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::render::triangles;
 use crate::table::list;
 use crate::view::file_name;
-use crate::{Console, Error};
+use crate::{Console, Error, outputs};
 
-#[derive(Serialize)]
-struct Report {
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct Report {
     file: String,
     kind: &'static str,
     triangles: usize,
@@ -28,7 +29,7 @@ struct Report {
     warnings: Vec<String>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct PrimitiveReport {
     triangles: usize,
     vertices: usize,
@@ -37,7 +38,7 @@ struct PrimitiveReport {
     material: String,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct MaterialReport {
     name: String,
     maps: Vec<MapReport>,
@@ -47,7 +48,7 @@ struct MaterialReport {
     ignored_extensions: Vec<String>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct MapReport {
     slot: &'static str,
     width: u32,
@@ -57,17 +58,19 @@ struct MapReport {
     uv_set: usize,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct CameraReport {
     position: [f32; 3],
     yfov_degrees: f32,
 }
 
 pub(super) fn inspect(path: &Path, allowed: &[PathBuf], console: &Console) -> Result<(), Error> {
-    let document = Document::open_allowing(path, allowed)?;
     let scene = Scene::load_allowing(path, allowed)?;
+    // An OBJ has no document, and no extensions.
+    let is_obj = outputs::has_extension(path, "obj");
+    let document = (!is_obj).then(|| Document::open_allowing(path, allowed)).transpose()?;
     let strings = |key: &str| -> Vec<String> {
-        let values = document.json().get(key).and_then(|v| v.as_array());
+        let values = document.as_ref().and_then(|d| d.json().get(key)?.as_array());
         values.into_iter().flatten().filter_map(|v| v.as_str().map(str::to_owned)).collect()
     };
     let primitives = scene.primitives.iter().enumerate().map(|(i, p)| PrimitiveReport {
@@ -105,7 +108,8 @@ pub(super) fn inspect(path: &Path, allowed: &[PathBuf], console: &Console) -> Re
         extensions_required: strings("extensionsRequired"),
         warnings: scene.warnings.clone(),
     };
-    console.result(&report, &text(&report))
+    let text = text(&report);
+    console.result(&super::Report::Model(report), &text)
 }
 
 fn maps(scene: &Scene, m: &Material) -> Vec<MapReport> {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use kinran_bake::cache::relative;
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -22,8 +23,8 @@ const KINDS: [(&str, &str, &[&str]); 7] = [
     ("kinran fit fuzz --json", "coefficients of fuzz", &["tilt", "spread", "p_s", "ambient"]),
 ];
 
-#[derive(Serialize)]
-struct Report {
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct Report {
     file: String,
     kind: &'static str,
     written_by: &'static str,
@@ -34,21 +35,21 @@ struct Report {
     warnings: Vec<String>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Member {
     name: String,
     value: String,
 }
 
 /// A file that a report names, as it is now.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Checked {
     file: String,
     bytes: usize,
     state: State,
 }
 
-#[derive(Clone, Copy, Serialize)]
+#[derive(Clone, Copy, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum State {
     AsWritten,
@@ -89,7 +90,8 @@ pub(super) fn inspect(path: &Path, console: &Console) -> Result<(), Error> {
         written: written.into_iter().map(|file| check(folder, file)).collect(),
         warnings: texts.filter_map(|text| Some(text.as_str()?.to_owned())).collect(),
     };
-    console.result(&report, &text(&report))
+    let text = text(&report);
+    console.result(&super::Report::Written(report), &text)
 }
 
 fn check(folder: &Path, file: WrittenFile) -> Checked {

@@ -2,12 +2,13 @@
 
 use glam::{Vec3, Vec4, vec3};
 use kinran_shading::{aniso_decode_matrix, normal_from_xy};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::content::Content;
 
 /// The smallest, the average and the largest value.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub(crate) struct Range {
     pub(crate) min: f32,
     pub(crate) mean: f32,
@@ -33,7 +34,7 @@ impl Range {
 }
 
 /// What is worth knowing about one level, by what the map holds.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum Statistics {
     Normal {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use kinran_image::{Texture, read_texture};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::statistics::Statistics;
@@ -13,8 +14,8 @@ use crate::table::{list, table};
 use crate::view::file_name;
 use crate::{Console, Error};
 
-#[derive(Serialize)]
-struct Report {
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct Report {
     file: String,
     kind: &'static str,
     format: String,
@@ -28,7 +29,7 @@ struct Report {
     levels: Vec<LevelReport>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct LevelReport {
     width: u32,
     height: u32,
@@ -65,7 +66,8 @@ pub(super) fn inspect(path: &Path, role: Option<Content>, console: &Console) -> 
         metadata: texture.metadata,
         levels,
     };
-    console.result(&report, &text(&report))
+    let text = text(&report);
+    console.result(&super::Report::Texture(report), &text)
 }
 
 /// What the texture's own key says it holds, else what its format suggests.

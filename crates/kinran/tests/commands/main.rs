@@ -2,7 +2,10 @@
 
 mod bad_input;
 mod common;
+mod help;
+mod init;
 mod inspect;
+mod json;
 mod render;
 mod shaders;
 mod trust;

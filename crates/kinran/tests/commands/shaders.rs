@@ -80,11 +80,12 @@ fn a_module_brings_what_it_needs_and_nothing_else() {
 #[test]
 fn the_list_names_modules_and_functions() {
     let modules = kinran_json(&["shaders", "--list"]);
-    let names: Vec<_> = modules.as_array().unwrap().iter().map(|m| m["name"].as_str().unwrap()).collect();
+    let names: Vec<_> =
+        modules["modules"].as_array().unwrap().iter().map(|m| m["name"].as_str().unwrap()).collect();
     let mut sorted = names.clone();
     sorted.sort_unstable();
     assert_eq!(sorted, MODULES);
-    let ggx = modules.as_array().unwrap().iter().find(|m| m["name"] == "ggx").unwrap();
+    let ggx = modules["modules"].as_array().unwrap().iter().find(|m| m["name"] == "ggx").unwrap();
     assert_eq!(ggx["needs"], serde_json::json!(["sym"]));
     assert!(ggx["functions"].as_array().unwrap().iter().any(|f| f == "ggx_aniso_d"), "{ggx}");
     let said = kinran(&["shaders", "--list"]);
