@@ -86,6 +86,7 @@ impl Error {
             Error::Usage(_) | Error::Folder(FolderError::Flag { .. }) => "usage",
             Error::Render(RenderError::Setting { .. }) => "usage",
             Error::File { .. } | Error::Folder(FolderError::NotAFolder(_)) => "input",
+            Error::Scene(kinran_scene::Error::Outside { .. }) => "input",
             Error::Image(error)
             | Error::Folder(FolderError::Image(error))
             | Error::Scene(kinran_scene::Error::Image(error)) => of_image(error),

@@ -128,10 +128,9 @@ pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
     let report = FuzzReport { fit, table: tabulated, returned, warning };
     match args.lang {
         // Constants are what was asked for, not a summary of it.
-        Some(language) => {
-            Console { quiet: false, ..console.clone() }.result(&report, &constants(&fit, warning, language))
-        }
-        None => console.result(&report, &text(&fit, tabulated, warning)),
+        Some(language) => Console { quiet: false, ..console.clone() }
+            .result(&report, &constants(&fit, report.warning.as_deref(), language)),
+        None => console.result(&report, &text(&fit, tabulated, report.warning.as_deref())),
     }
 }
 
