@@ -8,6 +8,7 @@ use kinran_image::{Pixels, full_level_count};
 use kinran_scene::{Document, LightKind, Material, Scene, TextureRef};
 use serde::Serialize;
 
+use crate::bake::normal_remarks;
 use crate::render::triangles;
 use crate::table::list;
 use crate::view::file_name;
@@ -83,6 +84,10 @@ pub(super) fn inspect(path: &Path, allowed: &[PathBuf], console: &Console) -> Re
         bake: bake(&scene, i),
         ignored_extensions: m.ignored_extensions.clone(),
     });
+    let remarks = scene.materials.iter().enumerate().flat_map(|(i, m)| match material_surface(&scene, i) {
+        Ok(surface) => normal_remarks(&m.name, &surface, None),
+        Err(_) => Vec::new(),
+    });
     let cameras = scene.cameras.iter().map(|camera| CameraReport {
         position: camera.transform.translation.to_array(),
         yfov_degrees: camera.yfov.to_degrees(),
@@ -103,7 +108,7 @@ pub(super) fn inspect(path: &Path, allowed: &[PathBuf], console: &Console) -> Re
         lights: lights.collect(),
         extensions_used: strings("extensionsUsed"),
         extensions_required: strings("extensionsRequired"),
-        warnings: scene.warnings.clone(),
+        warnings: scene.warnings.iter().cloned().chain(remarks).collect(),
     };
     console.result(&report, &text(&report))
 }
@@ -144,6 +149,7 @@ fn maps(scene: &Scene, m: &Material) -> Vec<MapReport> {
 /// What `kinran bake` does with a material, in words.
 fn bake(scene: &Scene, material: usize) -> String {
     match material_surface(scene, material) {
+        Ok(surface) if surface.place.is_none() => "nothing: its anisotropy is in factors alone".into(),
         Ok(surface) => {
             let (width, height) = surface.maps.size();
             let what = match surface.maps.roughness {
@@ -152,7 +158,7 @@ fn bake(scene: &Scene, material: usize) -> String {
             };
             format!("{what}, {width}x{height}, {} levels", full_level_count(width, height))
         }
-        Err(NoSurface::Plain) => "nothing: it has neither a normal nor an anisotropy map".into(),
+        Err(NoSurface::Plain) => "nothing: it has no normal map and is isotropic".into(),
         Err(NoSurface::Apart(reason)) => format!("nothing: {reason}"),
     }
 }
