@@ -750,6 +750,7 @@ impl Loader<'_> {
                     };
                     self.scene.primitives.push(posed.unwrap_or_else(|| primitive.clone()));
                 }
+                Loader::share_scale(&mut self.scene.primitives[first..]);
                 *range = first..self.scene.primitives.len();
             }
         }

@@ -132,7 +132,7 @@ pub struct Pose {
     pub skin: usize,
     /// The place in the world that [`Primitive::positions`] are relative to, which its instance has.
     pub origin: Vec3,
-    /// Size in the world over size in the mesh's space, the mean over the vertices; zero where the joints shrink it to
+    /// Size in the world over size in the mesh's space, the mean over the vertices of its mesh; zero where the joints shrink it to
     /// nothing, and no instance shows it.
     pub scale: f64,
     /// The joints mirror it: triangles turn the other way round than in the document.

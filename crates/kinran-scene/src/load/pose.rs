@@ -113,10 +113,10 @@ impl Loader<'_> {
         }
         let vertex = |i: usize| primitive.source.vertices.get(i).map_or(i, |&vertex| vertex as usize);
         let mut posed = primitive.clone();
-        // Far from the world's origin single precision would not hold what is fine.
-        let used = 0..primitive.positions.len();
-        let sum: DVec3 = used.map(|i| matrices[vertex(i)].translation).sum();
-        let origin = (sum / primitive.positions.len() as f64).as_vec3();
+        // Far from the world's origin single precision would not hold what is fine. All meshes of a skin are about one place,
+        // so that they stay one surface.
+        let sum: DVec3 = joints.iter().map(|joint| joint.translation).sum();
+        let origin = (sum / joints.len().max(1) as f64).as_vec3();
         let (mut size, mut mirrored) = (0.0, 0.0);
         for i in 0..primitive.positions.len() {
             let matrix = matrices[vertex(i)];
@@ -142,12 +142,27 @@ impl Loader<'_> {
             posed.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
             posed.tangents.iter_mut().for_each(|tangent| tangent.w = -tangent.w);
         }
-        if let Some(curvature) = posed.curvature.as_mut().filter(|_| scale > 0.0) {
-            curvature.millimetres /= scale as f32;
-        }
         posed.source.pose =
             Some(Pose { skin, origin, scale, mirrored, tangents: primitive.tangents.clone() });
         Ok(Some(posed))
+    }
+
+    /// Gives the primitives of a mesh that one skin holds one scale, by which the unit of curvature goes.
+    pub(super) fn share_scale(posed: &mut [Primitive]) {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for primitive in posed.iter() {
+            if let Some(pose) = &primitive.source.pose {
+                sum += pose.scale * primitive.positions.len() as f64;
+                count += primitive.positions.len() as f64;
+            }
+        }
+        for primitive in posed {
+            let Some(pose) = &mut primitive.source.pose else { continue };
+            pose.scale = sum / count;
+            if let Some(curvature) = primitive.curvature.as_mut().filter(|_| pose.scale > 0.0) {
+                curvature.millimetres /= pose.scale as f32;
+            }
+        }
     }
 
     /// For each of the document's vertices the mean of its joints' matrices; empty where it names none.
