@@ -249,7 +249,7 @@ pub(super) fn mark_skin(
 /// Where there is no mesh, or one without normals.
 pub(super) fn check(args: &super::Args, scene: &Scene, document: &Document) -> Result<Vec<String>, Error> {
     let flags = &args.curvature;
-    let mut wanted = meshes(scene);
+    let mut wanted = largest(scene, &mut Vec::new(), |mesh| mesh_name(document, mesh));
     wanted.retain(|mesh| mesh.iter().any(|&i| flags.wants(scene, &scene.primitives[i])));
     if wanted.is_empty() && (!flags.skin.is_empty() || flags.curvature == Which::All) {
         return Err(Error::Usage(format!(
