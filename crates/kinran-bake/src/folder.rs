@@ -46,7 +46,9 @@ use kinran_scene::Wrap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-pub use evidence::{GREEN_CONFIDENCE, GreenGuess, green_correlation, guess_green};
+use crate::aniso::NormalZ;
+
+pub use evidence::{GREEN_CONFIDENCE, GreenGuess, green_correlation, guess_green, odd_lengths};
 pub use load::{LoadedMap, LoadedMaterial};
 pub use names::{Green, Role};
 
@@ -76,6 +78,8 @@ pub struct Hints {
     pub anisotropy: Option<f32>,
     /// `--force-normal`: believe that a normal map is one, whatever its texels look like.
     pub force_normal: bool,
+    /// `--normal-blue`: z of normals is blue, not rebuilt.
+    pub normal_blue: bool,
     /// What lies beyond the maps' borders.
     pub wrap: [Wrap; 2],
 }
@@ -91,6 +95,7 @@ impl Default for Hints {
             roughness: None,
             anisotropy: None,
             force_normal: false,
+            normal_blue: false,
             wrap: [Wrap::Repeat; 2],
         }
     }
@@ -214,6 +219,8 @@ pub struct NormalSource {
     pub green_source: GreenSource,
     /// Do not ask the texels whether this is a normal map.
     pub force: bool,
+    /// Where z comes from.
+    pub z: NormalZ,
 }
 
 /// Roughness without a direction.
@@ -741,7 +748,8 @@ fn understand(
             GreenSource::Assumed => format!("assumed {sign}"),
         };
         add_note(&mut files[i].note, &how);
-        NormalSource { file: files[i].path.clone(), green, green_source, force: hints.force_normal }
+        let z = if hints.normal_blue { NormalZ::Blue } else { NormalZ::Rebuilt };
+        NormalSource { file: files[i].path.clone(), green, green_source, force: hints.force_normal, z }
     });
 
     // Direction and level.

@@ -33,6 +33,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use kinran_scene::is_gltf;
 use schemars::JsonSchema;
 use serde::Serialize;
 use toml::Spanned;
@@ -101,7 +102,7 @@ impl Kind {
         let is = |extension: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
         match self {
             Kind::Aniso => path.is_dir(),
-            Kind::Mesh => path.is_file() && (is("glb") || is("gltf")),
+            Kind::Mesh => path.is_file() && is_gltf(path),
             Kind::Detail => path.is_file() && EXTENSIONS.into_iter().any(is),
             Kind::Skin => path.is_file() && (is("csv") || is("json")),
         }

@@ -12,20 +12,21 @@ use crate::aniso::{NormalMap, RoughnessMaps, ScalarMap, SurfaceMaps};
 pub struct MaterialSurface {
     /// The maps.
     pub maps: SurfaceMaps,
-    /// A texture reference whose UV set, transform and wrapping all of the maps share.
-    pub place: TextureRef,
+    /// A texture reference whose UV set, transform and wrapping all of the maps share; `None` where there is no map, and
+    /// factors alone say what the surface is.
+    pub place: Option<TextureRef>,
 }
 
 /// Why a material has no surface to filter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NoSurface {
-    /// It has neither a normal map nor an anisotropy map: the mesh's normals and an isotropic roughness.
+    /// It has no normal map and is isotropic: the mesh's normals, and a roughness that is the same in all directions.
     Plain,
     /// Its maps lie on the mesh in different ways and cannot become one texture; the sentence says which.
     Apart(String),
 }
 
-/// The surface of material number `material`, when it has a normal map or an anisotropy map.
+/// The surface of material number `material`, when it has a normal map or is anisotropic, by a map or by factors.
 ///
 /// # Errors
 /// [`NoSurface`] otherwise, and where the maps do not share UV set, transform and wrapping.
@@ -36,25 +37,32 @@ pub fn material_surface(scene: &Scene, material: usize) -> Result<MaterialSurfac
     let m = &scene.materials[material];
     let anisotropy = m.anisotropy.as_ref().filter(|a| a.strength > 0.0);
     let anisotropy_texture = anisotropy.and_then(|a| a.texture.as_ref());
-    let Some(place) = m.normal.as_ref().or(anisotropy_texture) else {
+    if m.normal.is_none() && anisotropy.is_none() {
         return Err(NoSurface::Plain);
-    };
-    for (name, other) in [
-        ("anisotropyTexture", anisotropy_texture),
-        ("metallicRoughnessTexture", m.metallic_roughness.as_ref()),
-    ] {
-        if let Some(other) = other.filter(|o| !same_place(o, place)) {
-            return Err(NoSurface::Apart(apart(m, name, other, place)));
-        }
     }
+    let roughness_texture = m.metallic_roughness.as_ref();
+    let maps = [
+        ("normalTexture", m.normal.as_ref()),
+        ("anisotropyTexture", anisotropy_texture),
+        ("metallicRoughnessTexture", roughness_texture),
+    ];
+    let mut maps = maps.into_iter().filter_map(|(name, place)| Some((name, place?)));
+    let first = maps.next();
+    if let Some(first) = first
+        && let Some(other) = maps.find(|(_, other)| !other.lies_as(first.1))
+    {
+        return Err(NoSurface::Apart(apart(m, other, first)));
+    }
+    let place = first.map(|(_, place)| place);
 
     let image = |place: &TextureRef| -> Option<Arc<Image>> { scene.images.get(place.image)?.clone() };
-    let normal = m.normal.as_ref().and_then(image).map_or_else(NormalMap::flat, |image| NormalMap {
-        scale: m.normal_scale,
-        ..NormalMap::new(image, false)
-    });
+    let normal = m
+        .normal
+        .as_ref()
+        .and_then(image)
+        .map_or_else(NormalMap::flat, |image| NormalMap::gltf(image, m.normal_scale));
     let roughness = ScalarMap {
-        image: m.metallic_roughness.as_ref().and_then(image).map(|image| (image, 1)),
+        image: roughness_texture.and_then(image).map(|image| (image, 1)),
         factor: m.roughness_factor,
     };
     let roughness = match anisotropy {
@@ -66,24 +74,25 @@ pub fn material_surface(scene: &Scene, material: usize) -> Result<MaterialSurfac
         },
         None => RoughnessMaps::Isotropic(roughness),
     };
-    Ok(MaterialSurface { maps: SurfaceMaps { normal, roughness, wrap: place.wrap }, place: place.clone() })
+    let wrap = place.map_or([Wrap::Repeat; 2], |place| place.wrap);
+    Ok(MaterialSurface { maps: SurfaceMaps { normal, roughness, wrap }, place: place.cloned() })
 }
 
-fn same_place(a: &TextureRef, b: &TextureRef) -> bool {
-    (a.uv_set, a.transform, a.wrap) == (b.uv_set, b.transform, b.wrap)
-}
-
-fn apart(material: &Material, name: &str, other: &TextureRef, place: &TextureRef) -> String {
+fn apart(
+    material: &Material,
+    (name, other): (&str, &TextureRef),
+    (first, place): (&str, &TextureRef),
+) -> String {
     let wraps = |wrap: [Wrap; 2]| format!("{:?}/{:?}", wrap[0], wrap[1]).to_lowercase();
     let difference = if other.uv_set != place.uv_set {
         format!("UV set {} against {}", other.uv_set, place.uv_set)
-    } else if other.transform != place.transform {
+    } else if other.wrap == place.wrap {
         "another KHR_texture_transform".into()
     } else {
         format!("wrapping {} against {}", wraps(other.wrap), wraps(place.wrap))
     };
     format!(
-        "material \"{}\": {name} lies on the mesh in another way than its normal map ({difference}); its maps are left as they are",
+        "material \"{}\": {name} lies on the mesh in another way than {first} ({difference}); its maps are left as they are",
         material.name
     )
 }

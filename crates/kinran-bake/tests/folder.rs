@@ -908,6 +908,7 @@ fn sample_assets_of_another_kind_pass_for_normals() {
                     green: Green::Up,
                     green_source: GreenSource::Name,
                     force: false,
+                    z: kinran_bake::aniso::NormalZ::Rebuilt,
                 }),
                 roughness: Some(RoughnessSource::Isotropic(BaseRoughness::Constant(0.5))),
                 color: None,

@@ -7,7 +7,9 @@ use std::sync::Arc;
 
 use common::exact::{V3, beyond, clamped, degrees, dot, exact, m_n, unit};
 use common::{Random, Surface, levels_of};
-use kinran_bake::aniso::{DirectionMap, Filter, Kernel, NormalMap, RoughnessMaps, ScalarMap, SurfaceMaps};
+use kinran_bake::aniso::{
+    DirectionMap, Filter, Kernel, NormalMap, NormalZ, RoughnessMaps, ScalarMap, SurfaceMaps,
+};
 use kinran_image::{Channels, Image, Pixels};
 use kinran_scene::Wrap;
 
@@ -128,7 +130,8 @@ fn normals_are_read_upside_down_or_at_the_wrong_depth() {
             for (y_down, scale) in
                 [(false, 1.0), (true, 1.0), (false, 0.3), (true, 2.5), (false, -1.0), (false, 0.0)]
             {
-                let normal = NormalMap { image: Some(map.clone()), y_down, signed: false, scale };
+                let normal =
+                    NormalMap { image: Some(map.clone()), z: NormalZ::Rebuilt, y_down, signed: false, scale };
                 let got = level_0(normal, RoughnessMaps::Isotropic(ScalarMap::constant(0.5)), Wrap::Repeat);
                 for (i, got) in got.into_iter().enumerate() {
                     let (x, y) = at(i);
@@ -148,6 +151,45 @@ fn normals_are_read_upside_down_or_at_the_wrong_depth() {
                 }
             }
         }
+    }
+}
+
+/// glTF 2.0 section 3.9.3: `normalize((2c - 1) * (s, s, 1))`, of vectors of any length; what points into the surface is laid
+/// on it.
+#[test]
+fn blue_is_ignored_or_scaled() {
+    for depth in DEPTHS {
+        for (channels, y_down, scale) in [
+            (Channels::Rgb, false, 1.0),
+            (Channels::Rgba, false, 2.0),
+            (Channels::Rgb, true, 0.3),
+            (Channels::Rgb, false, -1.0),
+        ] {
+            let map = image(9, (WIDTH, HEIGHT), channels, depth);
+            let normal = NormalMap { y_down, ..NormalMap::gltf(map.clone(), scale) };
+            let got = level_0(normal, RoughnessMaps::Isotropic(ScalarMap::constant(0.5)), Wrap::Repeat);
+            for (i, got) in got.into_iter().enumerate() {
+                let (x, y) = at(i);
+                let [r, g, b] = [0, 1, 2].map(|c| sample(&map, x, y, c) * 2.0 - 1.0);
+                let s = f64::from(scale);
+                let wanted = [r * s, if y_down { -g } else { g } * s, b.max(0.0)];
+                let what = format!("{depth:?} {channels:?} y_down {y_down} scale {scale}");
+                close(&what, i, got, unit(wanted), [0.0625, 0.0, 0.0625]);
+            }
+        }
+    }
+    // Two channels have no blue, and no vector is flat.
+    let two = Arc::new(Image::new(1, 1, Channels::Rg, Pixels::U8(vec![128, 255])).unwrap());
+    let zero = Arc::new(Image::new(1, 1, Channels::Rgb, Pixels::F32(vec![0.5; 3])).unwrap());
+    for (map, wanted) in [(two, normal_of(128.0 / 127.5 - 1.0, 128.0 / 127.5 - 1.0)), (zero, [0.0, 0.0, 1.0])]
+    {
+        let maps = SurfaceMaps {
+            normal: NormalMap::gltf(map, 1.0),
+            roughness: RoughnessMaps::Isotropic(ScalarMap::constant(0.5)),
+            wrap: [Wrap::Repeat; 2],
+        };
+        let got = levels_of(&maps, Filter::Naive, Kernel::Box)[0][0];
+        close("one texel", 0, got, wanted, [0.0625, 0.0, 0.0625]);
     }
 }
 

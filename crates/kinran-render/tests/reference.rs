@@ -275,7 +275,7 @@ fn shadows_of_opaque_masked_blended_and_clear_sheets() {
         let mut sheet = prepare(&scene, None).materials[0].clone();
         sheet.base_color_factor.w = alpha;
         sheet.alpha_mode = alpha_mode;
-        sheet.transmissive = transmissive;
+        sheet.transmission = f32::from(u8::from(transmissive));
         sheet
     };
     let lit = radiance(None, true);

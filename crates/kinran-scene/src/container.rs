@@ -9,28 +9,54 @@ use percent_encoding::percent_decode_str;
 
 use crate::Error;
 
-/// A file's JSON and, in a GLB, its binary chunk.
+/// A file's JSON and, in a GLB, its other chunks.
 pub(crate) struct Container<'a> {
     pub(crate) json: &'a [u8],
     pub(crate) bin: Option<&'a [u8]>,
+    /// Chunks that glTF does not know, each with its type.
+    pub(crate) others: Vec<([u8; 4], &'a [u8])>,
+    /// What was mended, a sentence each.
+    pub(crate) warnings: Vec<String>,
+}
+
+impl<'a> Container<'a> {
+    /// Takes away what some exporters put around the JSON and glTF forbids (sections 4.4.3.2 and 2.7).
+    fn new(json: &'a [u8], bin: Option<&'a [u8]>, others: Vec<([u8; 4], &'a [u8])>) -> Self {
+        let mut warnings = Vec::new();
+        let bare = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+        if bare.len() < json.len() {
+            warnings
+                .push("the JSON begins with a byte order mark, which glTF forbids; it was left out".into());
+        }
+        let end = bare.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+        if end < bare.len() {
+            warnings.push("the JSON is padded with zeros where glTF wants spaces; they were left out".into());
+        }
+        Container { json: &bare[..end], bin, others, warnings }
+    }
 }
 
 const GLB_MAGIC: &[u8; 4] = b"glTF";
 const HEADER_SIZE: usize = 12;
 const CHUNK_HEADER_SIZE: usize = 8;
 
+/// Whether a file is glTF by its name: `.gltf`, `.glb`, or `.vrm`, which is a GLB.
+pub fn is_gltf(path: &Path) -> bool {
+    path.extension().is_some_and(|own| ["gltf", "glb", "vrm"].iter().any(|e| own.eq_ignore_ascii_case(e)))
+}
+
 /// Splits a GLB into its chunks, or takes the whole file for JSON when it does not begin with the GLB
-/// magic number (glTF 2.0 section 4.4; chunks of unknown type are skipped, as demanded there).
+/// magic number (glTF 2.0 section 4.4; chunks of unknown type are handed on, as demanded there).
 pub(crate) fn split<'a>(name: &Path, bytes: &'a [u8]) -> Result<Container<'a>, Error> {
     if !bytes.starts_with(GLB_MAGIC) {
-        let json = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        if json.iter().find(|byte| !byte.is_ascii_whitespace()) != Some(&b'{') {
+        let container = Container::new(bytes, None, Vec::new());
+        if container.json.iter().find(|byte| !byte.is_ascii_whitespace()) != Some(&b'{') {
             return Err(Error::malformed(
                 name,
                 "is not glTF: it begins neither with the GLB magic number nor with a JSON object",
             ));
         }
-        return Ok(Container { json, bin: None });
+        return Ok(container);
     }
     if bytes.len() < HEADER_SIZE {
         return Err(Error::malformed(name, "the GLB header is cut off; fetch or export the file again"));
@@ -50,7 +76,7 @@ pub(crate) fn split<'a>(name: &Path, bytes: &'a [u8]) -> Result<Container<'a>, E
         ));
     }
 
-    let (mut json, mut bin, mut at) = (None, None, HEADER_SIZE);
+    let (mut json, mut bin, mut others, mut at) = (None, None, Vec::new(), HEADER_SIZE);
     while at + CHUNK_HEADER_SIZE <= length {
         let (size, kind) = (u32_at(at) as usize, &bytes[at + 4..at + 8]);
         at += CHUNK_HEADER_SIZE;
@@ -67,21 +93,27 @@ pub(crate) fn split<'a>(name: &Path, bytes: &'a [u8]) -> Result<Container<'a>, E
             _ if json.is_none() => {
                 return Err(Error::malformed(name, "the first GLB chunk is not JSON"));
             }
-            _ => {}
+            kind => others.push(([kind[0], kind[1], kind[2], kind[3]], chunk)),
         }
         at += size;
     }
     let json = json.ok_or_else(|| Error::malformed(name, "the GLB has no JSON chunk"))?;
-    Ok(Container { json, bin })
+    Ok(Container::new(json, bin, others))
 }
 
-/// A GLB of a JSON and a binary chunk (no binary chunk when `bin` is empty), each padded to four bytes:
-/// JSON with spaces, binary with zeros (glTF 2.0 section 4.4.3).
-pub(crate) fn join(name: &Path, json: &[u8], bin: &[u8]) -> Result<Vec<u8>, Error> {
-    let json_size = json.len().next_multiple_of(4);
-    let bin_size = bin.len().next_multiple_of(4);
-    let bin_chunk = if bin.is_empty() { 0 } else { CHUNK_HEADER_SIZE + bin_size };
-    let length = HEADER_SIZE + CHUNK_HEADER_SIZE + json_size + bin_chunk;
+/// A GLB of a JSON chunk, a binary one (none when `bin` is empty) and others, each padded to four bytes: JSON with spaces,
+/// the others with zeros (glTF 2.0 section 4.4.3).
+pub(crate) fn join(
+    name: &Path,
+    json: &[u8],
+    bin: &[u8],
+    others: &[([u8; 4], Vec<u8>)],
+) -> Result<Vec<u8>, Error> {
+    let bin = (!bin.is_empty()).then_some((*b"BIN\0", bin));
+    let others = others.iter().map(|(kind, bytes)| (*kind, bytes.as_slice()));
+    let chunks: Vec<([u8; 4], &[u8])> = std::iter::once((*b"JSON", json)).chain(bin).chain(others).collect();
+    let sizes = chunks.iter().map(|(_, bytes)| CHUNK_HEADER_SIZE + bytes.len().next_multiple_of(4));
+    let length = HEADER_SIZE + sizes.sum::<usize>();
     let length_u32 = u32::try_from(length).map_err(|_| {
         Error::unsupported(
             name,
@@ -93,15 +125,11 @@ pub(crate) fn join(name: &Path, json: &[u8], bin: &[u8]) -> Result<Vec<u8>, Erro
     out.extend_from_slice(GLB_MAGIC);
     out.extend_from_slice(&2u32.to_le_bytes());
     out.extend_from_slice(&length_u32.to_le_bytes());
-    out.extend_from_slice(&(json_size as u32).to_le_bytes());
-    out.extend_from_slice(b"JSON");
-    out.extend_from_slice(json);
-    out.resize(HEADER_SIZE + CHUNK_HEADER_SIZE + json_size, b' ');
-    if !bin.is_empty() {
-        out.extend_from_slice(&(bin_size as u32).to_le_bytes());
-        out.extend_from_slice(b"BIN\0");
-        out.extend_from_slice(bin);
-        out.resize(length, 0);
+    for (kind, bytes) in chunks {
+        out.extend_from_slice(&(bytes.len().next_multiple_of(4) as u32).to_le_bytes());
+        out.extend_from_slice(&kind);
+        out.extend_from_slice(bytes);
+        out.resize(out.len().next_multiple_of(4), if kind == *b"JSON" { b' ' } else { 0 });
     }
     Ok(out)
 }

@@ -11,6 +11,7 @@ use percent_encoding::{AsciiSet, CONTROLS, percent_encode};
 use serde_json::{Map, Value, json};
 
 use crate::Error;
+use crate::compressed::{decompress, is_compressed};
 use crate::container::{
     Purpose, Refusal, Target, beside, fetch, folder_of, join, locate, parse_uri, read_regular_file, split,
 };
@@ -131,12 +132,16 @@ pub struct Document {
     json: Object,
     /// The GLB's binary chunk.
     bin: Option<Vec<u8>>,
+    /// The GLB's chunks that glTF does not know, with their types.
+    chunks: Vec<([u8; 4], Vec<u8>)>,
     /// Textures and images that the original refers to; only these are dropped once nothing does.
     original_textures: BTreeSet<usize>,
     original_images: BTreeSet<usize>,
     /// Images that [`Document::add_image_file`] has added: the caller writes their files.
     added_images: BTreeSet<usize>,
-    /// Index and bytes of a buffer that [`Document::set_attribute`] has added.
+    /// Buffer, first byte and length of what nothing refers to any more.
+    freed: Vec<(usize, usize, usize)>,
+    /// Index and bytes of a buffer that [`Document::set_attribute`] or [`Document::decompress`] has added.
     added_buffer: Option<(usize, Vec<u8>)>,
 }
 
@@ -177,11 +182,34 @@ impl Document {
             allowed: Vec::new(),
             json,
             bin: container.bin.map(<[u8]>::to_vec),
+            chunks: container.others.iter().map(|(kind, bytes)| (*kind, bytes.to_vec())).collect(),
             original_textures,
             original_images,
             added_images: BTreeSet::new(),
+            freed: Vec::new(),
             added_buffer: None,
         })
+    }
+
+    /// Replaces geometry that is compressed by Draco or meshopt by plain buffer views, so that attributes can be added to it;
+    /// whether there was any.
+    ///
+    /// # Errors
+    /// Where a buffer cannot be read or what is compressed is damaged.
+    ///
+    /// # Panics
+    /// After [`Document::set_attribute`].
+    pub fn decompress(&mut self) -> Result<bool, Error> {
+        assert!(self.added_buffer.is_none(), "geometry is decompressed before attributes are added");
+        if !is_compressed(array(&self.json, "extensionsUsed").iter().filter_map(Value::as_str)) {
+            return Ok(false);
+        }
+        let mut json = self.json.clone();
+        let plain = decompress(&self.path, &mut json, &|buffer| self.buffer(buffer))?;
+        self.added_buffer = Some((array(&json, "buffers").len() - 1, plain.bytes));
+        self.freed = plain.freed;
+        self.json = json;
+        Ok(true)
     }
 
     /// The file it was read from.
@@ -430,7 +458,7 @@ impl Document {
         }
     }
 
-    /// Writes the document as `.glb` or `.gltf`, told by the extension of `path`.
+    /// Writes the document as `.glb` (or `.vrm`, which is one) or `.gltf`, told by the extension of `path`.
     ///
     /// Textures and images that the original referred to and nothing refers to any more are dropped,
     /// with their bytes. In a `.glb` all buffers become the binary chunk; a `.gltf` that was a GLB, or that
@@ -439,7 +467,7 @@ impl Document {
     /// appears whole or not at all, the document last.
     ///
     /// The returned sentences say what could not be cleaned up, which is so when an extension may hold
-    /// indices that this function does not know of.
+    /// indices that this function does not know of, and which image files could not be copied.
     ///
     /// # Errors
     /// When a file cannot be read or written, when `path` has another extension, or when it or a copy would
@@ -458,10 +486,10 @@ impl Document {
         let path = path.as_ref();
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         let glb = match extension.as_deref() {
-            Some("glb") => true,
+            Some("glb" | "vrm") => true,
             Some("gltf") => false,
             _ => {
-                let reason = "the output's name must end in .glb or .gltf, which decides its format";
+                let reason = "the output's name must end in .glb, .vrm or .gltf, which decides its format";
                 return Err(Error::unsupported(path, reason));
             }
         };
@@ -473,7 +501,17 @@ impl Document {
         }
 
         let mut output = Output { json: self.json.clone(), files: BTreeMap::new(), warnings: Vec::new() };
-        let dropped_views = self.drop_unused(&mut output);
+        if !glb && !self.chunks.is_empty() {
+            let kinds = self.chunks.iter().map(|(kind, _)| String::from_utf8_lossy(kind).into_owned());
+            output.warnings.push(format!(
+                "chunks of the GLB that a .gltf has no place for were left out: {}",
+                kinds.collect::<Vec<_>>().join(", ")
+            ));
+        }
+        let mut dropped_views = self.drop_unused(&mut output);
+        for &(buffer, start, length) in &self.freed {
+            dropped_views.entry(buffer).or_default().push((start, start.saturating_add(length)));
+        }
         let bin = self.place_buffers(path, glb, &dropped_views, &mut output)?;
         self.place_images(path, &mut output)?;
 
@@ -481,7 +519,7 @@ impl Document {
             if glb { serde_json::to_vec(&output.json) } else { serde_json::to_vec_pretty(&output.json) };
         let encoded = encoded
             .map_err(|error| Error::malformed(path, format!("the JSON cannot be written: {error}")))?;
-        let bytes = if glb { join(path, &encoded, &bin)? } else { encoded };
+        let bytes = if glb { join(path, &encoded, &bin, &self.chunks)? } else { encoded };
         let mut files: Vec<(PathBuf, Vec<u8>)> = output.files.into_iter().collect();
         files.push((path.to_path_buf(), bytes));
         Ok(Packed { files, warnings: output.warnings })
@@ -680,14 +718,22 @@ impl Document {
             let Some(uri) = uri.filter(|uri| !uri.starts_with("data:") && !added.contains(uri)) else {
                 continue;
             };
-            let copied = self.copy(&uri, &format!("image {image}"), Purpose::Image, path, output)?;
-            entry_mut(&mut output.json, "images", image).insert("uri".into(), copied.into());
+            match self.copy(&uri, &format!("image {image}"), Purpose::Image, path, output) {
+                Ok(copied) => {
+                    drop(entry_mut(&mut output.json, "images", image).insert("uri".into(), copied.into()))
+                }
+                // What is not there was not needed, or there would be an error by now.
+                Err(Error::Malformed { reason, .. }) => {
+                    output.warnings.push(format!("{reason}; the document still refers to it"));
+                }
+                Err(error) => return Err(error),
+            }
         }
         Ok(())
     }
 
     /// Plans the copy of a file that the document names; gives its new URI. Paths that leave the document's
-    /// folder lose their folders.
+    /// folder lose their folders, and get a number where another file has their name.
     fn copy(
         &self,
         uri: &str,
@@ -707,18 +753,38 @@ impl Document {
         if same_file(folder.join("."), self.folder().join(".")) {
             return Ok(uri.to_owned());
         }
+        let bytes = self.fetch(&uri_of(&relative), what, purpose)?;
         let (target, uri) = if inside {
             let backslash = uri.contains('\\') || uri.to_ascii_lowercase().contains("%5c");
             (folder.join(&relative), if backslash { uri_of(&relative) } else { uri.to_owned() })
         } else {
-            let name = Path::new(&relative).file_name().and_then(|name| name.to_str()).ok_or_else(|| {
+            let file = Path::new(&relative);
+            let name = file.file_name().and_then(|name| name.to_str()).ok_or_else(|| {
                 Error::malformed(&self.path, format!("{what}: the URI \"{uri}\" does not name a file"))
             })?;
-            (folder.join(name), percent_encode(name.as_bytes(), PATH).to_string())
+            let stem = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or(name);
+            let end = name.strip_prefix(stem).unwrap_or_default();
+            let taken = self.names();
+            let numbered = (2..).map(|number| format!("{stem}_{number}{end}"));
+            let free = |name: &String| {
+                let planned = output.files.get(&folder.join(name));
+                planned.map_or(!taken.contains(&name.to_ascii_lowercase()), |planned| *planned == bytes)
+            };
+            let name = std::iter::once(name.to_owned()).chain(numbered).find(free).unwrap_or_default();
+            (folder.join(&name), percent_encode(name.as_bytes(), PATH).to_string())
         };
-        let bytes = self.fetch(&uri_of(&relative), what, purpose)?;
         self.emit(target, bytes, output)?;
         Ok(uri)
+    }
+
+    /// The names in the document's own folder that its images and buffers have, those that were added too, in lower case.
+    fn names(&self) -> BTreeSet<String> {
+        let uris = ["buffers", "images"].iter().flat_map(|list| array(&self.json, list));
+        let files = uris.filter_map(|entry| match parse_uri(entry.get("uri")?.as_str()?) {
+            Ok(Target::File(path)) if !path.contains('/') => Some(path.to_ascii_lowercase()),
+            _ => None,
+        });
+        files.collect()
     }
 
     /// Plans a file; two different contents for one name are refused, and so is a file of the original.

@@ -11,6 +11,8 @@ pub(crate) type Extensions = Map<String, Value>;
 pub(crate) struct Root {
     pub(crate) asset: Asset,
     #[serde(default)]
+    pub(crate) extensions_used: Vec<String>,
+    #[serde(default)]
     pub(crate) extensions_required: Vec<String>,
     pub(crate) scene: Option<usize>,
     #[serde(default)]
@@ -19,6 +21,8 @@ pub(crate) struct Root {
     pub(crate) nodes: Vec<Node>,
     #[serde(default)]
     pub(crate) meshes: Vec<Mesh>,
+    #[serde(default)]
+    pub(crate) skins: Vec<Rig>,
     #[serde(default)]
     pub(crate) cameras: Vec<Camera>,
     #[serde(default)]
@@ -162,6 +166,17 @@ pub(crate) struct Attributes {
     pub(crate) color_0: Option<usize>,
     #[serde(rename = "_CURVATURE")]
     pub(crate) curvature: Option<usize>,
+    /// `JOINTS_0` and what else there is.
+    #[serde(flatten)]
+    pub(crate) others: Extensions,
+}
+
+/// `skins` of the document: what moves a mesh by its joints.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Rig {
+    pub(crate) joints: Vec<usize>,
+    pub(crate) inverse_bind_matrices: Option<usize>,
 }
 
 /// `KINRAN_mesh_curvature` of a primitive.
@@ -378,6 +393,14 @@ pub(crate) struct DiffuseTransmission {
     #[serde(default = "one3")]
     pub(crate) diffuse_transmission_color_factor: [f32; 3],
     pub(crate) diffuse_transmission_color_texture: Option<TextureInfo>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Transmission {
+    #[serde(default)]
+    pub(crate) transmission_factor: f32,
+    pub(crate) transmission_texture: Option<serde::de::IgnoredAny>,
 }
 
 #[derive(Deserialize)]

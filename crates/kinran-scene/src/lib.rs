@@ -5,6 +5,7 @@
 //! for tools that replace its textures and leave everything else as it was.
 
 mod accessor;
+mod compressed;
 mod container;
 mod detail;
 mod document;
@@ -14,11 +15,13 @@ mod frame;
 mod fuzz;
 mod json;
 mod load;
+mod meshopt;
 mod obj;
 mod scene;
 mod studio;
 mod tangent;
 
+pub use container::is_gltf;
 pub use detail::{
     DETAIL_EXTENSION, DETAIL_LAYERS_MAX, Detail, DetailLayer, DetailMap, DetailMask, LayerTransform,
 };
@@ -26,8 +29,9 @@ pub use document::{Attribute, Document, Object, Packed, Slot, TextureExtension};
 pub use environment::Environment;
 pub use error::Error;
 pub use fuzz::{FUZZ_EXTENSION, Fuzz, FuzzAttenuation, FuzzDirection, FuzzLayer, FuzzPhase, SHEEN_MATCH};
+pub use load::{Maps, Needs};
 pub use scene::{
-    AlphaMode, Anisotropy, Camera, DiffuseTransmission, Instance, Light, LightKind, Material, Primitive,
-    Scene, Skin, SkinProfile, Source, TextureRef, VertexCurvature, Wrap,
+    AlphaMode, Anisotropy, Camera, DiffuseTransmission, Instance, Light, LightKind, Material, Pose,
+    Primitive, Scene, Skin, SkinProfile, Source, TextureRef, VertexCurvature, Wrap,
 };
 pub use tangent::arbitrary as any_tangent;

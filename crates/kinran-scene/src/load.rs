@@ -1,7 +1,9 @@
 //! Reads a glTF document into a [`Scene`].
 
 mod detail;
+mod pose;
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,7 +13,9 @@ use kinran_image::{Channels, Format, Image, Pixels, Texture};
 use rayon::prelude::*;
 use serde::Deserialize;
 
+use self::pose::Poses;
 use crate::accessor::Accessors;
+use crate::compressed::{decompress, is_compressed};
 use crate::container::{GivenResolver, Purpose, Resolver, beside, fetch, given, read_regular_file, split};
 use crate::obj::glb_from_obj;
 use crate::{
@@ -23,8 +27,14 @@ use crate::{
 /// Extensions that may stand in `extensionsRequired`: those this module reads, and those that change how
 /// a surface looks but leave the rest of the document as it is; the latter are listed in
 /// [`Material::ignored_extensions`] or in [`Scene::warnings`].
-const ADMITTED_EXTENSIONS: [&str; 27] = [
+/// What images are in textures of `EXT_texture_avif` and `EXT_texture_webp` matters only to who needs them.
+const ADMITTED_EXTENSIONS: [&str; 32] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "KHR_meshopt_compression",
+    "KHR_draco_mesh_compression",
+    "EXT_texture_avif",
+    "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -54,11 +64,12 @@ const ADMITTED_EXTENSIONS: [&str; 27] = [
 ];
 
 /// Material extensions that [`Material`] represents.
-const READ_MATERIAL_EXTENSIONS: [&str; 8] = [
+const READ_MATERIAL_EXTENSIONS: [&str; 9] = [
     "KHR_materials_anisotropy",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
     "KHR_materials_sheen",
+    "KHR_materials_transmission",
     "KINRAN_materials_aniso",
     "KINRAN_materials_detail",
     "KINRAN_materials_fuzz",
@@ -73,6 +84,36 @@ const TEXELS_MAX: u64 = 1 << 30;
 
 /// Instances that one scene may have; at 80 bytes each, 1.3 GB.
 const INSTANCES_MAX: usize = 1 << 24;
+
+/// The maps of materials that a task asks for, each group with those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Maps {
+    /// None.
+    None,
+    /// Of normals, roughness and anisotropy, which are filtered together.
+    Surface,
+    /// Of base colour, occlusion and emission too.
+    Plain,
+    /// All, and engine textures beside them.
+    All,
+}
+
+/// What of a document a task asks for. What is left out is neither read nor judged: a file that is damaged there is as good
+/// as another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needs {
+    /// Meshes, their places, lights and cameras.
+    pub geometry: bool,
+    /// Skinned meshes stand in the rest pose; without it, as their accessors have them.
+    pub rest_pose: bool,
+    /// Which images are read. A texture of another map that has no image is left out of its material with a warning.
+    pub maps: Maps,
+}
+
+impl Needs {
+    /// All there is.
+    pub const ALL: Needs = Needs { geometry: true, rest_pose: true, maps: Maps::All };
+}
 
 impl Scene {
     /// Reads a `.gltf` (with its buffers and images beside it, or in `data:` URIs) or a `.glb`; of an `.obj` the mesh, one
@@ -97,12 +138,20 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn load_allowing(path: impl AsRef<Path>, allowed: &[PathBuf]) -> Result<Scene, Error> {
+        Scene::load_part(path, allowed, &Needs::ALL)
+    }
+
+    /// As [`Scene::load_allowing`], of a document as much as `needs` says.
+    ///
+    /// # Errors
+    /// As [`Scene::load`], about what is needed.
+    pub fn load_part(path: impl AsRef<Path>, allowed: &[PathBuf], needs: &Needs) -> Result<Scene, Error> {
         let path = path.as_ref();
         let mut bytes = read_regular_file(path).map_err(|error| Error::io(path, error))?;
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
             bytes = glb_from_obj(path, &bytes)?;
         }
-        Scene::read(path, &bytes, &beside(path, allowed))
+        Scene::read(path, &bytes, &beside(path, allowed), needs)
     }
 
     /// Reads a document from memory. `name` stands for it in messages; `resolve` gives the bytes of a
@@ -111,26 +160,42 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn from_bytes(name: &Path, bytes: &[u8], resolve: &GivenResolver<'_>) -> Result<Scene, Error> {
-        Scene::read(name, bytes, &given(resolve))
+        Scene::read(name, bytes, &given(resolve), &Needs::ALL)
     }
 
-    fn read(name: &Path, bytes: &[u8], resolve: &Resolver<'_>) -> Result<Scene, Error> {
+    fn read(name: &Path, bytes: &[u8], resolve: &Resolver<'_>, needs: &Needs) -> Result<Scene, Error> {
         let container = split(name, bytes)?;
-        let root: json::Root = serde_json::from_slice(container.json)
-            .map_err(|error| Error::malformed(name, format!("the JSON does not describe glTF: {error}")))?;
+        let no_gltf = |error: serde_json::Error| {
+            Error::malformed(name, format!("the JSON does not describe glTF: {error}"))
+        };
+        let mut root: json::Root = serde_json::from_slice(container.json).map_err(no_gltf)?;
         admit(name, &root)?;
-        let buffers = load_buffers(name, &root, container.bin, resolve)?;
+        let mut buffers = load_buffers(name, &root, container.bin, resolve)?;
+        if needs.geometry && root.is_compressed() {
+            let mut document = serde_json::from_slice(container.json).map_err(no_gltf)?;
+            let buffer = |i: usize| {
+                let bytes = buffers.get(i).map(|bytes| Cow::Borrowed(bytes.as_slice()));
+                bytes.ok_or_else(|| Error::malformed(name, format!("buffer {i} does not exist")))
+            };
+            let plain = decompress(name, &mut document, &buffer)?;
+            buffers.push(plain.bytes);
+            root = serde_json::from_value(document.into()).map_err(no_gltf)?;
+        }
         let mut loader = Loader {
             name,
             root: &root,
             accessors: Accessors::new(name, &root, &buffers),
             first_use: Vec::new(),
-            scene: Scene::default(),
+            worlds: Vec::new(),
+            needs: *needs,
+            scene: Scene { warnings: container.warnings, ..Scene::default() },
         };
         loader.first_use = loader.first_uses();
         loader.materials()?;
-        let meshes = loader.meshes()?;
-        loader.nodes(&meshes)?;
+        if needs.geometry {
+            let meshes = loader.meshes()?;
+            loader.nodes(&meshes)?;
+        }
         loader.images(resolve)?;
         Ok(loader.scene)
     }
@@ -149,15 +214,13 @@ fn admit(name: &Path, root: &json::Root) -> Result<(), Error> {
     else {
         return Ok(());
     };
-    let remedy = match extension.as_str() {
-        "KHR_draco_mesh_compression" => "export it without Draco mesh compression, or decompress it first",
-        "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-            "export it without meshopt compression, or decompress it first"
-        }
-        "EXT_texture_webp" | "EXT_texture_avif" => "convert its textures to PNG or JPEG",
-        _ => "export it without this extension, or with it as optional",
-    };
-    Err(Error::unsupported(name, format!("requires the extension {extension}, which is not read; {remedy}")))
+    Err(Error::unsupported(
+        name,
+        format!(
+            "requires the extension {extension}, which is not read; export it without this extension, or with it as \
+             optional"
+        ),
+    ))
 }
 
 /// All buffers, each as long as its `byteLength` claims or longer.
@@ -173,6 +236,8 @@ fn load_buffers(
             let bytes = match (&buffer.uri, bin) {
                 (Some(uri), _) => fetch(name, &what, Purpose::Buffer, uri, resolve)?,
                 (None, Some(bin)) if i == 0 => bin.to_vec(),
+                // A placeholder for what is compressed elsewhere.
+                (None, _) if root.is_compressed() => return Ok(Vec::new()),
                 _ => return Err(Error::malformed(name, format!("{what} has no uri and no GLB chunk to be"))),
             };
             if (bytes.len() as u64) < buffer.byte_length {
@@ -187,13 +252,41 @@ fn load_buffers(
         .collect()
 }
 
+impl json::Root {
+    fn is_compressed(&self) -> bool {
+        is_compressed(self.extensions_used.iter().map(String::as_str))
+    }
+}
+
 struct Loader<'a> {
     name: &'a Path,
     root: &'a json::Root,
     accessors: Accessors<'a>,
     /// For each image the first one with the same source.
     first_use: Vec<usize>,
+    /// Of all nodes, once a skin has asked for them.
+    worlds: Vec<Option<DAffine3>>,
+    needs: Needs,
     scene: Scene,
+}
+
+impl Material {
+    /// The textures of the maps that are asked for.
+    fn needed(&self, maps: Maps) -> Vec<&TextureRef> {
+        let anisotropy = self.anisotropy.as_ref().filter(|a| a.strength > 0.0);
+        let surface = [
+            &self.normal,
+            &self.metallic_roughness,
+            anisotropy.map_or(&None, |anisotropy| &anisotropy.texture),
+        ];
+        let plain = [&self.base_color, &self.occlusion, &self.emissive];
+        match maps {
+            Maps::None => Vec::new(),
+            Maps::Surface => surface.into_iter().flatten().collect(),
+            Maps::Plain => surface.into_iter().chain(plain).flatten().collect(),
+            Maps::All => self.textures().collect(),
+        }
+    }
 }
 
 impl Loader<'_> {
@@ -264,8 +357,11 @@ impl Loader<'_> {
                     let what = format!("{what}: anisotropyRotation");
                     self.finite([anisotropy.anisotropy_rotation], &what)?[0]
                 },
-                texture: self
-                    .texture(&anisotropy.anisotropy_texture, &format!("{what}: anisotropyTexture"))?,
+                texture: self.map(
+                    Maps::Surface,
+                    &anisotropy.anisotropy_texture,
+                    &format!("{what}: anisotropyTexture"),
+                )?,
             }),
             None => None,
         };
@@ -309,29 +405,45 @@ impl Loader<'_> {
             base_color_factor: self
                 .finite(pbr.base_color_factor, &format!("{what}: baseColorFactor"))?
                 .into(),
-            base_color: self.texture(&pbr.base_color_texture, &format!("{what}: baseColorTexture"))?,
+            base_color: self.map(
+                Maps::Plain,
+                &pbr.base_color_texture,
+                &format!("{what}: baseColorTexture"),
+            )?,
             metallic_factor: self.unit(pbr.metallic_factor, &format!("{what}: metallicFactor"))?,
             roughness_factor: self.unit(pbr.roughness_factor, &format!("{what}: roughnessFactor"))?,
-            metallic_roughness: self
-                .texture(&pbr.metallic_roughness_texture, &format!("{what}: metallicRoughnessTexture"))?,
-            normal: self.texture(&material.normal_texture, &format!("{what}: normalTexture"))?,
+            metallic_roughness: self.map(
+                Maps::Surface,
+                &pbr.metallic_roughness_texture,
+                &format!("{what}: metallicRoughnessTexture"),
+            )?,
+            normal: self.map(Maps::Surface, &material.normal_texture, &format!("{what}: normalTexture"))?,
             normal_scale: {
                 let scale = material.normal_texture.as_ref().map_or(1.0, |info| info.scale);
                 self.finite([scale], &format!("{what}: normalTexture.scale"))?[0]
             },
-            occlusion: self.texture(&material.occlusion_texture, &format!("{what}: occlusionTexture"))?,
+            occlusion: self.map(
+                Maps::Plain,
+                &material.occlusion_texture,
+                &format!("{what}: occlusionTexture"),
+            )?,
             occlusion_strength: {
                 let strength = material.occlusion_texture.as_ref().map_or(1.0, |info| info.strength);
                 self.unit(strength, &format!("{what}: occlusionTexture.strength"))?
             },
             emissive_factor: self.finite(emissive.to_array(), &format!("{what}: emissiveFactor"))?.into(),
-            emissive: self.texture(&material.emissive_texture, &format!("{what}: emissiveTexture"))?,
+            emissive: self.map(
+                Maps::Plain,
+                &material.emissive_texture,
+                &format!("{what}: emissiveTexture"),
+            )?,
             anisotropy,
             aniso,
             skin: self.skin(&material.extensions, &what)?,
             fuzz: self.fuzz(material, &what)?,
             detail: self.detail(&material.extensions, &what)?,
             diffuse_transmission,
+            transmission: self.transmission(&material.extensions, &what)?,
             alpha_mode: match material.alpha_mode {
                 json::AlphaMode::Opaque => AlphaMode::Opaque,
                 json::AlphaMode::Mask => AlphaMode::Mask {
@@ -345,6 +457,17 @@ impl Loader<'_> {
                 .cloned()
                 .collect(),
         })
+    }
+
+    /// The factor of `KHR_materials_transmission`.
+    fn transmission(&mut self, extensions: &json::Extensions, what: &str) -> Result<f32, Error> {
+        let transmission: Option<json::Transmission> =
+            self.extension(extensions, "KHR_materials_transmission", what)?;
+        let Some(transmission) = transmission else { return Ok(0.0) };
+        if transmission.transmission_texture.is_some() {
+            self.warn(format!("{what}: transmissionTexture is left out; its factor is taken everywhere"));
+        }
+        self.unit(transmission.transmission_factor, &format!("{what}: transmissionFactor"))
     }
 
     /// `KINRAN_materials_skin`.
@@ -508,6 +631,34 @@ impl Loader<'_> {
     }
 
     fn texture(&mut self, info: &Option<json::TextureInfo>, what: &str) -> Result<Option<TextureRef>, Error> {
+        self.map(Maps::All, info, what)
+    }
+
+    /// A texture of a group of maps.
+    fn map(
+        &mut self,
+        group: Maps,
+        info: &Option<json::TextureInfo>,
+        what: &str,
+    ) -> Result<Option<TextureRef>, Error> {
+        match self.texture_ref(info, what) {
+            Err(error) if group > self.needs.maps => {
+                let reason = match error {
+                    Error::Malformed { reason, .. } | Error::Unsupported { reason, .. } => reason,
+                    other => other.to_string(),
+                };
+                self.warn(format!("{reason}; it is left as it is"));
+                Ok(None)
+            }
+            result => result,
+        }
+    }
+
+    fn texture_ref(
+        &mut self,
+        info: &Option<json::TextureInfo>,
+        what: &str,
+    ) -> Result<Option<TextureRef>, Error> {
         let Some(info) = info else { return Ok(None) };
         let root = self.root;
         let texture = (root.textures.get(info.index))
@@ -570,24 +721,40 @@ impl Loader<'_> {
     }
 
     /// Reads every mesh; gives the scene's primitives of each.
-    fn meshes(&mut self) -> Result<Vec<std::ops::Range<usize>>, Error> {
+    fn meshes(&mut self) -> Result<Vec<Poses>, Error> {
         let root = self.root;
-        let mut ranges = Vec::with_capacity(root.meshes.len());
-        for (m, mesh) in root.meshes.iter().enumerate() {
-            let first = self.scene.primitives.len();
+        let mut meshes = self.skins_of_meshes();
+        for (m, (mesh, poses)) in root.meshes.iter().zip(&mut meshes).enumerate() {
+            let what = |p: usize| match &mesh.name {
+                Some(name) => format!("mesh {m} \"{name}\", primitive {p}"),
+                None => format!("mesh {m}, primitive {p}"),
+            };
+            let mut primitives = Vec::new();
             for (p, primitive) in mesh.primitives.iter().enumerate() {
-                let what = match &mesh.name {
-                    Some(name) => format!("mesh {m} \"{name}\", primitive {p}"),
-                    None => format!("mesh {m}, primitive {p}"),
-                };
-                if let Some(mut primitive) = self.primitive(primitive, &what)? {
+                if let Some(mut primitive) = self.primitive(primitive, &what(p))? {
                     (primitive.source.mesh, primitive.source.primitive) = (m, p);
-                    self.scene.primitives.push(primitive);
+                    primitives.push(primitive);
                 }
             }
-            ranges.push(first..self.scene.primitives.len());
+            for (skin, range) in poses {
+                let first = self.scene.primitives.len();
+                let joints = skin.map(|skin| self.joints(skin)).transpose()?;
+                for primitive in &primitives {
+                    let p = primitive.source.primitive;
+                    let posed = match (skin, &joints) {
+                        (Some(skin), Some(joints)) => {
+                            let attributes = &mesh.primitives[p].attributes;
+                            self.posed(primitive, attributes, (*skin, joints), &what(p))?
+                        }
+                        _ => None,
+                    };
+                    self.scene.primitives.push(posed.unwrap_or_else(|| primitive.clone()));
+                }
+                Loader::share_scale(&mut self.scene.primitives[first..]);
+                *range = first..self.scene.primitives.len();
+            }
         }
-        Ok(ranges)
+        Ok(meshes)
     }
 
     fn primitive(&mut self, primitive: &json::Primitive, what: &str) -> Result<Option<Primitive>, Error> {
@@ -775,9 +942,8 @@ impl Loader<'_> {
 
         let material = &self.scene.materials[primitive.material];
         let uses: Vec<&TextureRef> = material.textures().collect();
-        let tangents_matter =
-            material.normal.is_some() || material.anisotropy.is_some() || material.aniso.is_some();
-        let tangent_set = uses.first().map_or(0, |texture| texture.uv_set);
+        let tangents_matter = material.needs_tangents();
+        let tangent_set = material.tangent_uv_set();
         let missing: Vec<usize> = [0, 1]
             .into_iter()
             .filter(|&set| primitive.uvs[set].is_empty() && uses.iter().any(|texture| texture.uv_set == set))
@@ -806,21 +972,22 @@ impl Loader<'_> {
                     "{what}: {mended} tangents have no length or point along the normal; any direction was taken"
                 ));
             }
-        } else if !primitive.uvs[tangent_set].is_empty() {
-            tangent::generate(primitive, tangent_set);
-        } else {
-            if tangents_matter {
-                self.warn(format!(
-                    "{what} has neither TANGENT nor TEXCOORD_{tangent_set}, and its material \"{name}\" needs \
-                     tangents; any direction was taken"
-                ));
-            }
-            primitive.tangents = primitive.normals.iter().map(|&n| tangent::arbitrary(n)).collect();
+            return;
+        }
+        if primitive.uvs[tangent_set].is_empty() && tangents_matter {
+            self.warn(format!(
+                "{what} has neither TANGENT nor TEXCOORD_{tangent_set}, and its material \"{name}\" needs \
+                 tangents; any direction was taken"
+            ));
+        }
+        match [tangent_set, 1 - tangent_set].into_iter().find(|&set| !primitive.uvs[set].is_empty()) {
+            Some(set) => tangent::generate(primitive, set),
+            None => primitive.tangents = primitive.normals.iter().map(|&n| tangent::arbitrary(n)).collect(),
         }
     }
 
     /// Walks the scene's tree and places meshes, lights and cameras.
-    fn nodes(&mut self, meshes: &[std::ops::Range<usize>]) -> Result<(), Error> {
+    fn nodes(&mut self, meshes: &[Poses]) -> Result<(), Error> {
         let root = self.root;
         let mut stack: Vec<(usize, DAffine3)> =
             self.roots()?.into_iter().rev().map(|node| (node, DAffine3::IDENTITY)).collect();
@@ -842,14 +1009,31 @@ impl Loader<'_> {
             stack.extend(node.children.iter().rev().map(|&child| (child, transform)));
 
             if let Some(mesh) = node.mesh {
-                let primitives = (meshes.get(mesh))
-                    .ok_or_else(|| self.error(format!("{what}: mesh {mesh} does not exist")))?
-                    .clone();
+                let poses = (meshes.get(mesh))
+                    .ok_or_else(|| self.error(format!("{what}: mesh {mesh} does not exist")))?;
+                let skin = node.skin.filter(|_| self.needs.rest_pose);
                 if node.skin.is_some() {
                     self.warn(format!("{what} is skinned; it is shown in its rest pose"));
                 }
-                for local in self.instances(node, &what)? {
-                    self.place(primitives.clone(), transform * local, &what)?;
+                let instances = self.instances(node, &what)?;
+                let primitives = poses[&skin].clone();
+                for (i, local) in instances.into_iter().enumerate() {
+                    for primitive in primitives.clone() {
+                        match &self.scene.primitives[primitive].source.pose {
+                            None => self.place(primitive, transform * local, &what)?,
+                            // The joints say where it is; glTF ignores the node's own place.
+                            Some(pose) if i == 0 => {
+                                let size = DVec3::splat(f64::from(pose.scale > 0.0));
+                                let place = DAffine3::from_scale_rotation_translation(
+                                    size,
+                                    DQuat::IDENTITY,
+                                    pose.origin.as_dvec3(),
+                                );
+                                self.place(primitive, place, &what)?;
+                            }
+                            Some(_) => {}
+                        }
+                    }
                 }
             }
             if let Some(light) = &node.extensions.light {
@@ -949,21 +1133,16 @@ impl Loader<'_> {
             .collect()
     }
 
-    fn place(
-        &mut self,
-        primitives: std::ops::Range<usize>,
-        transform: DAffine3,
-        what: &str,
-    ) -> Result<(), Error> {
+    fn place(&mut self, primitive: usize, transform: DAffine3, what: &str) -> Result<(), Error> {
         let transform = transform.as_affine3a();
         if !transform.is_finite() || !transform.inverse().is_finite() {
             self.warn(format!("{what} is scaled to nothing along an axis; its mesh was left out"));
             return Ok(());
         }
-        if self.scene.instances.len() + primitives.len() > INSTANCES_MAX {
+        if self.scene.instances.len() >= INSTANCES_MAX {
             return Err(self.error(format!("{what}: the scene has more than {INSTANCES_MAX} instances")));
         }
-        self.scene.instances.extend(primitives.map(|primitive| Instance { primitive, transform }));
+        self.scene.instances.push(Instance { primitive, transform });
         Ok(())
     }
 
@@ -1058,9 +1237,10 @@ impl Loader<'_> {
     fn images(&mut self, resolve: &Resolver<'_>) -> Result<(), Error> {
         let count = self.root.images.len();
         let (mut drawn, mut runtime) = (vec![false; count], vec![false; count]);
-        for texture in self.scene.materials.iter().flat_map(Material::textures) {
+        let maps = self.needs.maps;
+        for texture in self.scene.materials.iter().flat_map(|material| material.needed(maps)) {
             drawn[texture.image] = true;
-            if let Some(image) = texture.runtime {
+            if let Some(image) = texture.runtime.filter(|_| maps == Maps::All) {
                 runtime[image] = true;
             }
         }

@@ -1,24 +1,24 @@
 //! Wavefront OBJ, as the glTF that it says the same as.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use serde_json::{Value, json};
-use tobj::{LoadError, LoadOptions, Model};
 
 use crate::Error;
 
 /// Vertices and faces of an OBJ as `.glb`: polygons in triangles, a primitive for each object or group, one grey material.
-/// Material libraries are not read. OBJ knows no unit; what reads the glTF takes metres.
+/// Faces with and without normals or UVs are primitives of their own. Lines, points, curves and material libraries are not
+/// read. OBJ knows no unit; what reads the glTF takes metres.
 ///
 /// # Errors
 /// [`Error::Malformed`] where a line is none of the format, or there are no faces.
-pub(crate) fn glb_from_obj(name: &Path, mut text: &[u8]) -> Result<Vec<u8>, Error> {
-    let options = LoadOptions { single_index: true, triangulate: true, ..LoadOptions::default() };
-    let (models, _) = tobj::load_obj_buf(&mut text, &options, |_| Ok(Default::default()))
-        .map_err(|e| Error::malformed(name, format!("{}; export the OBJ anew", reason(&e))))?;
+pub(crate) fn glb_from_obj(name: &Path, text: &[u8]) -> Result<Vec<u8>, Error> {
+    let meshes = parse(text).map_err(|(line, reason)| {
+        Error::malformed(name, format!("line {line}: {reason}; export the OBJ anew"))
+    })?;
     let mut file = Parts::default();
-    let primitives: Vec<Value> =
-        models.iter().filter(|m| !m.mesh.indices.is_empty()).map(|m| file.primitive(m)).collect();
+    let primitives: Vec<Value> = meshes.iter().map(|mesh| file.primitive(mesh)).collect();
     if primitives.is_empty() {
         return Err(Error::malformed(name, "the OBJ has no faces; export the mesh with them"));
     }
@@ -58,17 +58,131 @@ pub(crate) fn glb_from_obj(name: &Path, mut text: &[u8]) -> Result<Vec<u8>, Erro
     Ok(glb)
 }
 
-fn reason(error: &LoadError) -> &'static str {
-    match error {
-        LoadError::PositionParseError => "a v line has no three numbers",
-        LoadError::NormalParseError => "a vn line has no three numbers",
-        LoadError::TexcoordParseError => "a vt line has no two numbers",
-        LoadError::FaceVertexOutOfBounds => "a face names a v that is not there",
-        LoadError::FaceTexCoordOutOfBounds => "a face names a vt that is not there",
-        LoadError::FaceNormalOutOfBounds => "a face names a vn that is not there",
-        LoadError::FaceParseError => "an f line is no face",
-        _ => "it is no OBJ",
+/// Triangles whose corners all have the same attributes.
+#[derive(Default)]
+struct Mesh {
+    positions: Vec<f32>,
+    /// Empty where corners have none.
+    uvs: Vec<f32>,
+    /// Empty where corners have none.
+    normals: Vec<f32>,
+    indices: Vec<u32>,
+    /// The vertex of a `v/vt/vn`.
+    vertices: HashMap<[Option<usize>; 3], u32>,
+}
+
+/// The faces of an OBJ, and else the number of a line and what is wrong there.
+fn parse(text: &[u8]) -> Result<Vec<Mesh>, (usize, String)> {
+    let (mut positions, mut uvs, mut normals) = (Vec::new(), Vec::new(), Vec::new());
+    let mut meshes: Vec<Mesh> = Vec::new();
+    // Meshes of the group that is read, by whether they have UVs and normals.
+    let mut group: HashMap<[bool; 2], usize> = HashMap::new();
+    for (number, line) in lines(text) {
+        let at = |reason: String| (number, reason);
+        // Comments and names may be in any encoding.
+        let line = String::from_utf8_lossy(&line);
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => positions.push(numbers::<3>(words, "v").map_err(at)?),
+            Some("vt") => uvs.push(numbers::<2>(words, "vt").map_err(at)?),
+            Some("vn") => normals.push(numbers::<3>(words, "vn").map_err(at)?),
+            Some("o" | "g") => group.clear(),
+            Some("f") => {
+                let counts = [positions.len(), uvs.len(), normals.len()];
+                let corners: Result<Vec<_>, String> = words.map(|word| corner(word, counts)).collect();
+                let mut corners = corners.map_err(at)?;
+                if corners.len() < 3 {
+                    return Err(at(format!("a face of {} corners", corners.len())));
+                }
+                let has = [1, 2].map(|part| corners.iter().all(|corner| corner[part].is_some()));
+                let mesh = *group.entry(has).or_insert_with(|| {
+                    meshes.push(Mesh::default());
+                    meshes.len() - 1
+                });
+                let mesh = &mut meshes[mesh];
+                for corner in &mut corners {
+                    // What only some corners of a face have is not there.
+                    corner[1] = corner[1].filter(|_| has[0]);
+                    corner[2] = corner[2].filter(|_| has[1]);
+                }
+                let face: Vec<u32> = (corners.into_iter())
+                    .map(|corner| {
+                        *mesh.vertices.entry(corner).or_insert_with(|| {
+                            let [v, vt, vn] = corner;
+                            mesh.positions.extend(v.iter().flat_map(|&v| positions[v]));
+                            // OBJ counts v from below.
+                            mesh.uvs.extend(vt.iter().flat_map(|&vt| [uvs[vt][0], 1.0 - uvs[vt][1]]));
+                            mesh.normals.extend(vn.iter().flat_map(|&vn| normals[vn]));
+                            (mesh.positions.len() / 3 - 1) as u32
+                        })
+                    })
+                    .collect();
+                for pair in face[1..].windows(2) {
+                    mesh.indices.extend([face[0], pair[0], pair[1]]);
+                }
+            }
+            _ => {}
+        }
     }
+    Ok(meshes)
+}
+
+/// Lines without their comments, each with the number of its first one; a backslash at the end joins the next, but not in a
+/// comment, which may end with the name of a folder.
+fn lines(text: &[u8]) -> impl Iterator<Item = (usize, Vec<u8>)> {
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    let mut lines = text.split(|&byte| byte == b'\n').enumerate();
+    std::iter::from_fn(move || {
+        let (number, mut line) = lines.next()?;
+        let mut whole = Vec::new();
+        loop {
+            let end = line.iter().position(|&byte| byte == b'#').unwrap_or(line.len());
+            match line[..end].trim_ascii_end().strip_suffix(b"\\") {
+                Some(part) => {
+                    whole.extend(part);
+                    whole.push(b' ');
+                }
+                None => {
+                    whole.extend(&line[..end]);
+                    break;
+                }
+            }
+            let Some((_, next)) = lines.next() else { break };
+            line = next;
+        }
+        Some((number + 1, whole))
+    })
+}
+
+/// The first numbers of a line; more may follow, such as colours of vertices.
+fn numbers<'a, const N: usize>(
+    mut words: impl Iterator<Item = &'a str>,
+    what: &str,
+) -> Result<[f32; N], String> {
+    let mut numbers = [0.0; N];
+    for number in &mut numbers {
+        let word = words.next().ok_or_else(|| format!("a {what} line has fewer than {N} numbers"))?;
+        *number = word.parse().map_err(|_| format!("a {what} line has \"{word}\" for a number"))?;
+    }
+    Ok(numbers)
+}
+
+/// Indices of a face's corner from 0, of `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative ones count from the end of what was
+/// read so far.
+fn corner(word: &str, counts: [usize; 3]) -> Result<[Option<usize>; 3], String> {
+    let mut corner = [None; 3];
+    for (i, (part, count)) in word.split('/').zip(counts).enumerate() {
+        if part.is_empty() && i > 0 {
+            continue;
+        }
+        let name = ["v", "vt", "vn"][i];
+        let index: i64 = part.parse().map_err(|_| format!("a face has \"{word}\" for a corner"))?;
+        let from_zero = if index < 0 { count as i64 + index } else { index - 1 };
+        let within = usize::try_from(from_zero).ok().filter(|&index| index < count);
+        corner[i] =
+            Some(within.ok_or_else(|| format!("a face names {name} {index}, and there are {count}"))?);
+    }
+    Ok(corner)
 }
 
 /// What primitives are made of.
@@ -80,16 +194,13 @@ struct Parts {
 }
 
 impl Parts {
-    fn primitive(&mut self, model: &Model) -> Value {
-        let mesh = &model.mesh;
+    fn primitive(&mut self, mesh: &Mesh) -> Value {
         let mut attributes = json!({ "POSITION": self.floats(&mesh.positions, 3) });
         if !mesh.normals.is_empty() {
             attributes["NORMAL"] = self.floats(&mesh.normals, 3).into();
         }
-        if !mesh.texcoords.is_empty() {
-            // OBJ counts v from below.
-            let uvs: Vec<f32> = mesh.texcoords.chunks_exact(2).flat_map(|t| [t[0], 1.0 - t[1]]).collect();
-            attributes["TEXCOORD_0"] = self.floats(&uvs, 2).into();
+        if !mesh.uvs.is_empty() {
+            attributes["TEXCOORD_0"] = self.floats(&mesh.uvs, 2).into();
         }
         let indices = mesh.indices.iter().flat_map(|i| i.to_le_bytes());
         let indices = self.accessor(

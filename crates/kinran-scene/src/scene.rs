@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
 
-use crate::{Detail, Fuzz};
+use crate::{Detail, DetailMap, Fuzz};
 
 /// How a texture repeats outside the unit square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -28,6 +28,20 @@ pub struct TextureRef {
     pub transform: Mat3,
     /// Repetition along u and v.
     pub wrap: [Wrap; 2],
+}
+
+/// What the elements of two transforms may differ by and be the same, for the largest of them: the rounding of decimals
+/// and of a rotation written as 2π. Over UVs up to 16 it moves a texel of 4096² by a fifteenth of its side.
+const TRANSFORM_ROUNDING: f32 = 1e-6;
+
+impl TextureRef {
+    /// Whether both lie on the mesh in the same way: UV set, wrapping and, up to rounding, the transform.
+    pub fn lies_as(&self, other: &TextureRef) -> bool {
+        let elements = self.transform.to_cols_array();
+        let largest = elements.into_iter().fold(1.0_f32, |largest, x| largest.max(x.abs()));
+        (self.uv_set, self.wrap) == (other.uv_set, other.wrap)
+            && self.transform.abs_diff_eq(other.transform, TRANSFORM_ROUNDING * largest)
+    }
 }
 
 /// `KHR_materials_anisotropy`.
@@ -95,7 +109,7 @@ pub struct VertexCurvature {
 }
 
 /// Where a primitive comes from.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Source {
     /// Index of the document's mesh.
     pub mesh: usize,
@@ -107,6 +121,24 @@ pub struct Source {
     pub lacks_normals: bool,
     /// The document has no tangents here; those of [`Primitive`] were made.
     pub lacks_tangents: bool,
+    /// Where a skin holds it: [`Primitive`] is not in the mesh's space then but in the world, about [`Pose::origin`].
+    pub pose: Option<Pose>,
+}
+
+/// How a skin holds a primitive in the rest pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pose {
+    /// Index of the document's skin.
+    pub skin: usize,
+    /// The place in the world that [`Primitive::positions`] are relative to, which its instance has.
+    pub origin: Vec3,
+    /// Size in the world over size in the mesh's space, the mean over the vertices of its mesh; zero where the joints shrink it to
+    /// nothing, and no instance shows it.
+    pub scale: f64,
+    /// The joints mirror it: triangles turn the other way round than in the document.
+    pub mirrored: bool,
+    /// The vertices' tangents in the mesh's space.
+    pub tangents: Vec<Vec4>,
 }
 
 /// `KHR_materials_diffuse_transmission`: of the light that a thin surface scatters, the share that comes out on its
@@ -176,6 +208,8 @@ pub struct Material {
     pub detail: Option<Detail>,
     /// `KHR_materials_diffuse_transmission`, when present.
     pub diffuse_transmission: Option<DiffuseTransmission>,
+    /// `KHR_materials_transmission`'s factor, 0 to 1: the share of the light that is not reflected which passes through.
+    pub transmission: f32,
     /// Transparency.
     pub alpha_mode: AlphaMode,
     /// Both sides are lit; otherwise back faces are culled.
@@ -206,6 +240,7 @@ impl Default for Material {
             fuzz: None,
             detail: None,
             diffuse_transmission: None,
+            transmission: 0.0,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
             ignored_extensions: Vec::new(),
@@ -214,8 +249,38 @@ impl Default for Material {
 }
 
 impl Material {
-    /// Every texture of the material; the normal map first, then the anisotropy map, for the first one
-    /// tells which UV set generated tangents follow.
+    /// The maps that hold directions in the surface's plane, of the first of which generated tangents follow the UVs.
+    fn directed(&self) -> impl Iterator<Item = &TextureRef> {
+        let fibres = self.fuzz.as_ref().and_then(|fuzz| match fuzz {
+            Fuzz::Layer(layer) => layer.direction_texture.as_ref(),
+            Fuzz::Simple { .. } => None,
+        });
+        let detail = |map| self.detail.as_ref().and_then(|d| d.maps[map as usize].as_ref());
+        [
+            self.normal.as_ref(),
+            self.anisotropy.as_ref().and_then(|anisotropy| anisotropy.texture.as_ref()),
+            self.aniso.as_ref(),
+            detail(DetailMap::Normal),
+            detail(DetailMap::Aniso),
+            fibres,
+        ]
+        .into_iter()
+        .flatten()
+    }
+
+    /// Whether the surface has a direction in its plane, by a map or by a factor, so that tangents are seen.
+    pub fn needs_tangents(&self) -> bool {
+        let combed = matches!(&self.fuzz, Some(Fuzz::Layer(layer)) if layer.tilt != 0.0);
+        combed || self.anisotropy.is_some() || self.directed().next().is_some()
+    }
+
+    /// The UV set that generated tangents follow: that of the first map which holds directions, whichever other maps there
+    /// are; `TEXCOORD_0` without any.
+    pub fn tangent_uv_set(&self) -> usize {
+        self.directed().next().map_or(0, |texture| texture.uv_set)
+    }
+
+    /// Every texture of the material.
     pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
         let diffuse_transmission = self.diffuse_transmission.as_ref();
         [
@@ -239,7 +304,7 @@ impl Material {
 /// Triangles of one material. All vertex arrays have the same length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Primitive {
-    /// Metres.
+    /// Metres, times the instance's scale.
     pub positions: Vec<Vec3>,
     /// Unit length.
     pub normals: Vec<Vec3>,

@@ -339,7 +339,7 @@ fn nothing_of_the_original_is_overwritten() {
         );
     };
     refuse(&document, folder.path().join("in.glb"), "is the document that was read");
-    refuse(&document, folder.path().join("out.obj"), "must end in .glb or .gltf");
+    refuse(&document, folder.path().join("out.obj"), "must end in .glb, .vrm or .gltf");
     refuse(&document, folder.path().join("missing/out.glb"), "out.glb");
     assert_eq!(std::fs::read(folder.path().join("in.glb")).unwrap(), glb(&json, &bin));
 }

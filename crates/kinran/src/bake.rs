@@ -16,7 +16,7 @@ use kinran_image::{
     Encoder, Encoding, Format, Preset, Role, Texture, encode_dds, encode_ktx2, full_level_count, level_size,
     write_atomically,
 };
-use kinran_scene::Wrap;
+use kinran_scene::{Wrap, is_gltf};
 
 use crate::content::Content;
 use crate::init::{MANIFEST, Survey};
@@ -28,6 +28,7 @@ use crate::{Console, Error};
 pub use curvature::{CurvatureArgs, CurvatureReport};
 pub use folder::bake_folder;
 pub use gltf::bake_gltf;
+pub(crate) use gltf::normal_remarks;
 pub use library::{CACHE_LIMIT, LibraryArgs, LibraryReport, bake_library, cache_folder};
 pub use report::{Input, Output, Report, SurfaceReport};
 
@@ -38,7 +39,7 @@ pub use report::{Input, Output, Report, SurfaceReport};
 /// which settles it. Each material becomes NAME_normal and NAME_aniso (and NAME_color, NAME_orm where there
 /// are such maps), and NAME.kinran.json, which says how they were made and what was lost on each level.
 ///
-/// A .glb or .gltf: every material with a normal or an anisotropy map gets normal, roughness and anisotropy
+/// A .glb or .gltf: every material with a normal map, or a map under anisotropy, gets normal, roughness and anisotropy
 /// textures whose every level is right, in glTF's own terms; the model is written beside them.
 ///
 /// A kinran.toml: everything that it lists, in parallel; what has not changed is not baked again. See
@@ -112,11 +113,11 @@ pub struct Args {
     #[arg(long)]
     pub all_textures: bool,
 
-    /// Green grows upwards in normal maps (OpenGL, glTF), whatever their names say
+    /// Green grows upwards in normal maps (OpenGL, glTF), whatever their names and slopes say
     #[arg(long, conflicts_with = "y_down")]
     pub y_up: bool,
 
-    /// Green grows downwards in normal maps (DirectX), whatever their names say
+    /// Green grows downwards in normal maps (DirectX), whatever their names say; a glTF file's are turned round
     #[arg(long)]
     pub y_down: bool,
 
@@ -155,6 +156,9 @@ pub struct Args {
     /// Overwrites files that kinran did not write, or that were changed since
     #[arg(long)]
     pub force: bool,
+    /// Of a folder's normal maps, take z from blue as glTF does, instead of rebuilding it from red and green
+    #[arg(long)]
+    pub normal_blue: bool,
 
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -286,6 +290,19 @@ impl From<PresetName> for Preset {
     }
 }
 
+/// Flags that say how a folder's maps are read, where a glTF file speaks for itself.
+const FOLDER_FLAGS: [&str; 9] = [
+    "edges",
+    "direction-span",
+    "map",
+    "ignore",
+    "roughness",
+    "anisotropy",
+    "roughness-is-gloss",
+    "force-normal",
+    "normal-blue",
+];
+
 impl Args {
     /// Where the files go.
     fn output(&self) -> &Path {
@@ -303,8 +320,25 @@ impl Args {
             roughness: self.roughness,
             anisotropy: self.anisotropy,
             force_normal: self.force_normal,
+            normal_blue: self.normal_blue,
             wrap: self.wrap(),
         }
+    }
+
+    /// The first of [`FOLDER_FLAGS`] that is given.
+    fn folder_flag(&self) -> Option<&'static str> {
+        let given = [
+            self.edges != Edges::default(),
+            self.direction_span.is_some(),
+            !self.map.is_empty(),
+            !self.ignore.is_empty(),
+            self.roughness.is_some(),
+            self.anisotropy.is_some(),
+            self.roughness_is_gloss,
+            self.force_normal,
+            self.normal_blue,
+        ];
+        FOLDER_FLAGS.into_iter().zip(given).find_map(|(flag, given)| given.then_some(flag))
     }
 
     /// A map's encoding: the role's measured default, changed by what flags say.
@@ -374,7 +408,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         ));
     }
     check_formats(args)?;
-    let gltf = has_extension(&args.input, "glb") || has_extension(&args.input, "gltf");
+    let gltf = is_gltf(&args.input);
     if args.input.is_file() && !gltf {
         let reason = match has_extension(&args.input, "obj") {
             true => "an OBJ brings no materials with maps; save it as .glb (Blender does) and bake that",
@@ -388,7 +422,13 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if !args.dry_run {
         check_folder(args.output())?;
     }
-    match (gltf && !args.input.is_dir(), args.dry_run) {
+    let gltf = gltf && !args.input.is_dir();
+    if let Some(flag) = args.folder_flag().filter(|_| gltf) {
+        let reason =
+            format!("--{flag} is about folders of maps, and a glTF file says it itself; leave the flag out");
+        return Err(Error::file_error(&args.input, reason));
+    }
+    match (gltf, args.dry_run) {
         (false, false) => folder::run(args, console).map_err(|e| with_a_way(e, console)),
         (false, true) => folder::dry_run(args, console).map_err(|e| with_a_way(e, console)),
         (true, false) => gltf::run(args, console),

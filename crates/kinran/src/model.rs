@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
 use kinran_image::{Channels, Image, Pixels, read_texture};
-use kinran_scene::{Anisotropy, Instance, Material, Primitive, Scene, Source, TextureRef, Wrap};
+use kinran_scene::{Anisotropy, Instance, Material, Primitive, Scene, Source, TextureRef, Wrap, is_gltf};
 use serde::Deserialize;
 
 use crate::Error;
@@ -99,15 +99,12 @@ impl Place {
             files.push(entry.map_err(|e| complain(&e))?.path());
         }
         files.sort();
-        let ending = |endings: &[&str]| -> Vec<PathBuf> {
-            let ends = |file: &Path| {
-                let name = file.to_string_lossy().to_ascii_lowercase();
-                endings.iter().any(|ending| name.ends_with(ending))
-            };
-            files.iter().filter(|file| ends(file)).cloned().collect()
-        };
-        let sidecars = ending(&[".kinran.json"]);
-        match ending(&[".glb", ".gltf", ".obj"]).as_slice() {
+        let ends = |file: &Path, ending: &str| file.to_string_lossy().to_ascii_lowercase().ends_with(ending);
+        let sidecars: Vec<PathBuf> =
+            files.iter().filter(|file| ends(file, ".kinran.json")).cloned().collect();
+        let is_model = |file: &&PathBuf| is_gltf(file) || ends(file, ".obj");
+        let models: Vec<PathBuf> = files.iter().filter(is_model).cloned().collect();
+        match models.as_slice() {
             [model] => Ok(Place::File(model.clone())),
             [] if sidecars.is_empty() => Err(complain(
                 &"no .glb, .gltf or .obj file in this folder, and no textures that `kinran bake` wrote with their .kinran.json; name a model, or bake one",

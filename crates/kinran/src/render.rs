@@ -19,7 +19,7 @@ use crate::{Console, Error, outputs};
 /// Renders a glTF file, or a folder of baked textures
 ///
 /// A model that `kinran bake` wrote, or any other with KTX2 or DDS files that hold mips, is drawn with these. Of others,
-/// every material with a normal or an anisotropy map is baked in memory first, with the filter that --filter names and the
+/// every material with a normal map or with anisotropy is baked in memory first, with the filter that --filter names and the
 /// block compression that `kinran bake` uses, and drawn with the mips that result, as a GPU would sample them. The textures
 /// of a baked folder are laid on boards. The same input gives the same picture, bit by bit, on any number of threads.
 ///

@@ -19,7 +19,7 @@ use kinran_shading::skin::profile::Gaussian;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::bake::curvature::{Blur, Joined, MethodName, deviations, meshes, unit};
+use crate::bake::curvature::{Blur, Joined, MethodName, deviations, meshes, pose_scale, unit};
 use crate::picture::{Color, INK, PAPER, Picture, Row, grid};
 use crate::skin::{SIZE, profile, skin_table};
 use crate::skin_lut::plot::plot;
@@ -304,7 +304,8 @@ fn bake(
             warnings.push(format!("{name} has no normals; smooth ones were estimated"));
             surface = of(scene);
         }
-        let millimetres = args.unit_mm.map_or_else(|| unit(scene, &group, &name, warnings), f64::from);
+        let millimetres = args.unit_mm.map_or_else(|| unit(scene, &group, &name, warnings), f64::from)
+            / pose_scale(&scene.primitives[group[0]]);
         let options = Options {
             method: args.curvature_method.into(),
             millimetres,

@@ -3,13 +3,14 @@
 use std::f64::consts::FRAC_PI_2;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use glam::Vec3;
 use kinran_bake::aniso::{
     Filter, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps, SurfaceOptions, TexelSpan,
     bake_surface,
 };
 use kinran_bake::fuzz_fit::{FuzzFit, Phase, ambient_texels, fuzz_fit};
 use kinran_bake::{NoSurface, material_surface};
-use kinran_image::{Role, Texture, full_level_count, level_size};
+use kinran_image::{Format, Role, Texture, full_level_count, level_size};
 use kinran_render::reference::{
     AnisoEncoding, BoundTexture, FUZZ_TILTS, FuzzCoefficients, FuzzFits, MipLevel, MipTexture,
     SurfaceTextures,
@@ -49,7 +50,7 @@ impl Mips {
     }
 }
 
-/// Surface textures of every material of `scene`, `None` for those without a normal or anisotropy map, and a
+/// Surface textures of every material of `scene`, `None` for isotropic ones without a normal map, and a
 /// sentence for each material whose maps could not be filtered together.
 ///
 /// # Errors
@@ -73,7 +74,7 @@ pub fn scene_surfaces(
                 let sheets = [Sheet::Normal, Sheet::Aniso];
                 let name = &scene.materials[i].name;
                 let [normal, aniso] = textures(&surface.maps, sheets, mips, name, progress)?;
-                let [normal, aniso] = [normal, aniso].map(|t| BoundTexture::new(t, &surface.place));
+                let [normal, aniso] = [normal, aniso].map(|t| bind(t, surface.place.as_ref()));
                 Ok(Some(SurfaceTextures::new(normal, aniso)))
             }
             Err(NoSurface::Plain) => Ok(None),
@@ -124,7 +125,12 @@ fn baked_surface(scene: &Scene, m: &Material) -> Result<Option<SurfaceTextures>,
     let bound = |place: Option<&TextureRef>, texel: [f32; 4]| -> Result<BoundTexture, Error> {
         match place.and_then(|place| Some((place, runtime(scene, place)?))) {
             Some((place, texture)) => {
-                Ok(BoundTexture::new(Arc::new(MipTexture::from_texture(texture, place.wrap)?), place))
+                let is_normal = normal.is_some_and(|normal| std::ptr::eq(normal, place));
+                let mut mips = MipTexture::from_texture(texture, place.wrap)?;
+                if is_normal && !texture.metadata.contains_key("KinranMap") {
+                    unit_normals(texture.format, &mut mips);
+                }
+                Ok(BoundTexture::new(Arc::new(mips), place))
             }
             None => Ok(BoundTexture::constant(texel)),
         }
@@ -133,6 +139,28 @@ fn baked_surface(scene: &Scene, m: &Material) -> Result<Option<SurfaceTextures>,
     let normal = bound(normal, [0.5, 0.5, 1.0, 1.0])?;
     let aniso = bound(aniso, [1.0, 0.5, 1.0, 1.0])?;
     Ok(Some(SurfaceTextures { normal, aniso, encoding }))
+}
+
+/// Brings vectors of red, green and blue to unit length together, as glTF has it, since shaders rebuild z. Kinran's own
+/// textures have that length, and what has two channels has no other z.
+fn unit_normals(format: Format, mips: &mut MipTexture) {
+    if matches!(format, Format::Bc4 | Format::Bc5) {
+        return;
+    }
+    for texel in mips.levels.iter_mut().flat_map(|level| &mut level.texels) {
+        let [x, y, z, _] = texel.map(|c| 2.0 * c - 1.0);
+        let n = Vec3::new(x, y, z.max(0.0)).normalize_or(Vec3::Z);
+        [texel[0], texel[1], texel[2]] = (0.5 * n + 0.5).to_array();
+    }
+    mips.encoded = None;
+}
+
+/// A texture in its place; one of a single texel needs none.
+fn bind(texture: Arc<MipTexture>, place: Option<&TextureRef>) -> BoundTexture {
+    match place {
+        Some(place) => BoundTexture::new(texture, place),
+        None => BoundTexture { texture, ..BoundTexture::constant([0.0; 4]) },
+    }
 }
 
 /// The sheets of a surface as decoded mip chains.
@@ -144,9 +172,11 @@ fn textures<const N: usize>(
     progress: &Progress,
 ) -> Result<[Arc<MipTexture>; N], Error> {
     let size = maps.size();
-    let Mips::Filtered(filter) = mips else {
+    let filter = match mips {
+        // A single texel has nothing to filter, and a factor is not to be rounded to 8 bits.
+        Mips::Filtered(filter) if size != (1, 1) => filter,
         // What is baked already never comes here.
-        return Ok(level_0(maps, sheets).map(Arc::new));
+        _ => return Ok(level_0(maps, sheets).map(Arc::new)),
     };
     let requests = sheets.map(|sheet| {
         let role = if sheet == Sheet::Normal { Role::Normal } else { Role::Aniso };
@@ -200,9 +230,7 @@ fn separate_surface(
     let anisotropy = m.anisotropy.as_ref().filter(|a| a.strength > 0.0);
     let anisotropy_place = anisotropy.and_then(|a| a.texture.as_ref());
     let roughness_place = m.metallic_roughness.as_ref();
-    let together = |a: &TextureRef| TextureRef { image: 0, runtime: None, ..a.clone() };
-    let roughness_place =
-        roughness_place.filter(|r| anisotropy_place.is_none_or(|a| together(a) == together(r)));
+    let roughness_place = roughness_place.filter(|r| anisotropy_place.is_none_or(|a| a.lies_as(r)));
 
     let roughness =
         ScalarMap { image: image(roughness_place).map(|image| (image, 1)), factor: m.roughness_factor };
@@ -219,15 +247,10 @@ fn separate_surface(
         let wrap = place.map_or([kinran_scene::Wrap::Repeat; 2], |place| place.wrap);
         let maps = SurfaceMaps { normal, roughness, wrap };
         let [texture] = textures(&maps, [sheet], mips, &m.name, progress)?;
-        Ok(match place {
-            Some(place) => BoundTexture::new(texture, place),
-            None => BoundTexture { texture, ..BoundTexture::constant([0.0; 4]) },
-        })
+        Ok(bind(texture, place))
     };
-    let normal = image(m.normal.as_ref()).map_or_else(NormalMap::flat, |image| NormalMap {
-        scale: m.normal_scale,
-        ..NormalMap::new(image, false)
-    });
+    let normal =
+        image(m.normal.as_ref()).map_or_else(NormalMap::flat, |image| NormalMap::gltf(image, m.normal_scale));
     let smooth = RoughnessMaps::Isotropic(ScalarMap::constant(1.0));
     Ok(SurfaceTextures::new(
         bound(Sheet::Normal, m.normal.as_ref(), normal, smooth)?,

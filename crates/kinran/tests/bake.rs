@@ -446,6 +446,140 @@ fn flags_that_make_no_sense_are_accepted() {
     assert!(files(parent.path()).is_empty(), "written: {:?}", files(parent.path()));
 }
 
+/// What a glTF file says itself is nothing that a flag can say.
+#[test]
+fn flags_about_folders_are_swallowed_by_models() {
+    let (folder, model) = square();
+    let out = folder.path().join("out");
+    for flags in [
+        &["--edges", "clamp"][..],
+        &["--direction-span", "180"],
+        &["--map", "normal=nothing.png"],
+        &["--ignore", "nothing.png"],
+        &["--roughness", "0.1"],
+        &["--anisotropy", "0.9"],
+        &["--roughness-is-gloss"],
+        &["--force-normal"],
+        &["--normal-blue"],
+    ] {
+        refused(&[&["bake", text(&model), "-o", text(&out)], flags].concat(), &[flags[0], "square.glb"]);
+        assert!(!out.exists(), "{flags:?} wrote something");
+        // In a library they are a mistake of the entry, and nothing where they are everyone's default.
+        let key = flags[0].trim_start_matches("--");
+        let value = flags.get(1).map_or("true".into(), |value| format!("\"{value}\""));
+        let manifest = folder.path().join("kinran.toml");
+        let entry = |own: &str, default: &str| {
+            format!("output = \"lib\"\n[defaults]\n{default}\n[[mesh]]\ninput = \"square.glb\"\n{own}\n")
+        };
+        let setting = format!("{key} = {value}");
+        std::fs::write(&manifest, entry(&setting, "")).unwrap();
+        refused(&["bake", text(&manifest), "--dry-run"], &[key, "glTF"]);
+        std::fs::write(&manifest, entry("", &setting)).unwrap();
+        let said = kinran(&["bake", text(&manifest), "--dry-run"]);
+        assert_eq!(said.code, Some(0), "{key} as a default: {}", said.err);
+    }
+}
+
+/// The commonest fault of authored glTF: green that points down.
+#[test]
+fn green_down_in_a_model_is_not_noticed_or_not_turned() {
+    let (folder, model) = square();
+    let turned = |bytes: &[u8]| {
+        let png = encode_png(&bumps()).unwrap();
+        let at = bytes.windows(png.len()).position(|part| part == png).unwrap();
+        let up = bumps();
+        let down = image(32, Channels::Rgb, |x, y| {
+            let [r, g, b, _] = up.texel(x, y).map(|v| (v * 255.0).round() as u8);
+            [r, 255 - g, b, 255]
+        });
+        let mut out = bytes.to_vec();
+        let new = encode_png(&down).unwrap();
+        assert!(new.len() <= png.len(), "the image does not fit where the other was");
+        out[at..at + new.len()].copy_from_slice(&new);
+        out
+    };
+    let wrong = folder.path().join("wrong.glb");
+    std::fs::write(&wrong, turned(&std::fs::read(&model).unwrap())).unwrap();
+    let bake = |model: &Path, flags: &[&str]| {
+        let out = folder.path().join("out");
+        let report = kinran_json(
+            &[&["bake", text(model), "-o", text(&out), "--normal-format", "rgba8"], flags].concat(),
+        );
+        let stem = model.file_stem().unwrap().to_str().unwrap();
+        let texture = read_texture(&out.join(format!("{stem}_hammered_normal.ktx2"))).unwrap();
+        (
+            report["warnings"].to_string(),
+            texture.decode_level(0).unwrap(),
+            out.join(format!("{stem}_hammered_normal.png")),
+        )
+    };
+    let (said, wanted, _) = bake(&model, &[]);
+    assert!(!said.contains("green"), "{said}");
+    let (said, as_it_is, _) = bake(&wrong, &[]);
+    assert!(said.contains("--y-down") && said.contains("hammered"), "{said}");
+    let (said, by_flag, _) = bake(&wrong, &["--y-up"]);
+    assert!(said.contains("--y-up"), "{said}");
+    assert!(as_it_is == by_flag, "a flag that agrees with glTF changes texels");
+    let (said, got, fallback) = bake(&wrong, &["--y-down"]);
+    assert!(!said.contains("green"), "{said}");
+    let fallback = read_image(&fallback).unwrap();
+    for (i, (got, wanted)) in got.iter().zip(&wanted).enumerate() {
+        let png = fallback.texel(i as u32 % 32, i as u32 / 32);
+        for c in 0..3 {
+            // 255 - g is no exact mirror: half a step about the middle, and one of rounding.
+            assert!((got[c] - wanted[c]).abs() < 2.1 / 255.0, "texel {i}: wanted {wanted:?}, got {got:?}");
+            assert!(
+                (got[c] - png[c]).abs() < 0.5 / 255.0,
+                "texel {i}: {got:?}, and the fallback has {png:?}"
+            );
+        }
+    }
+    let said = kinran(&["inspect", text(&wrong)]);
+    assert!(said.code == Some(0) && said.out.contains("--y-down"), "{}{}", said.out, said.err);
+}
+
+/// Textures of slots that a bake does not touch, geometry that it does not read.
+#[test]
+fn what_a_bake_does_not_need_stops_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = anisotropic_model(folder.path());
+    let mut document: Value = serde_json::from_slice(&std::fs::read(&model).unwrap()).unwrap();
+    document["images"]
+        .as_array_mut()
+        .unwrap()
+        .extend([json!({ "uri": "gone.png" }), json!({ "uri": "cut.png" })]);
+    std::fs::write(folder.path().join("cut.png"), &encode_png(&bumps()).unwrap()[..60]).unwrap();
+    document["textures"].as_array_mut().unwrap().extend([
+        json!({ "source": 2 }),
+        json!({ "source": 3 }),
+        json!({ "extensions": { "EXT_texture_webp": { "source": 3 } } }),
+    ]);
+    document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({ "index": 2 });
+    document["materials"][0]["emissiveTexture"] = json!({ "index": 3 });
+    document["materials"][0]["extensions"]["KHR_materials_sheen"] =
+        json!({ "sheenColorFactor": [1, 1, 1], "sheenColorTexture": { "index": 4 } });
+    document["accessors"][0]["componentType"] = json!(1);
+    document["extensionsRequired"] = json!(["EXT_texture_webp"]);
+    std::fs::write(&model, serde_json::to_vec(&document).unwrap()).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let report = kinran_json(&["bake", text(&model), "-o", text(out.path())]);
+    let warnings = report["warnings"].to_string();
+    for part in ["gone.png", "sheenColorTexture"] {
+        assert!(warnings.contains(part), "no {part} in {warnings}");
+    }
+    let written: Value =
+        serde_json::from_slice(&std::fs::read(out.path().join("square.gltf")).unwrap()).unwrap();
+    let uri = |info: &Value| {
+        let texture = &written["textures"][info["index"].as_u64().unwrap() as usize];
+        written["images"][texture["source"].as_u64().unwrap() as usize]["uri"].clone()
+    };
+    assert_eq!(uri(&written["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]), "gone.png");
+    assert_eq!(uri(&written["materials"][0]["emissiveTexture"]), "cut.png");
+    assert!(out.path().join("cut.png").exists(), "a file that is not read is still copied");
+    // Asked for, they are.
+    refused(&["bake", text(&model), "-o", text(out.path()), "--all-textures"], &["square.gltf"]);
+}
+
 /// Every format that is asked for is what the files hold.
 #[test]
 fn formats_on_request_are_others() {

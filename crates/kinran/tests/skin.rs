@@ -396,6 +396,86 @@ fn skinned_and_morphed_meshes_are_baked_in_their_rest_pose_and_stay_so() {
     }
 }
 
+/// glTF places a skinned mesh by its joints alone: a sphere of 10 mm is one however scale is spread over its vertices, its
+/// bind matrix, its joint, the joint's parent and its own node, turned and mirrored too.
+#[test]
+fn a_skin_is_measured_by_its_node_or_its_vertices() {
+    let folder = tempfile::tempdir().unwrap();
+    // Scales of vertices, inverse bind matrix, joint and its parent.
+    for (i, (vertices, bind, joint, parent)) in [
+        (1.0_f32, 1.0_f32, 1.0, 1.0),
+        (819_150.0, 1.0 / 819_150.0, 1.0, 1.0),
+        (100.0, 1.0, 0.01, 1.0),
+        (100.0, 1.0, 1.0, 0.01),
+        (1.0, 100.0, 1.0, 0.01),
+        (1.0, -1.0, 1.0, 1.0),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let mut mesh = Mesh::sphere(0.01);
+        mesh.positions.iter_mut().for_each(|p| *p *= vertices);
+        let (mut document, mut binary) = mesh.document();
+        let count = mesh.positions.len();
+        let joints = json!({ "componentType": 5121, "count": count, "type": "VEC4" });
+        let joints = add(&mut document, &mut binary, &[0u8, 1, 0, 0].repeat(count), joints);
+        // Two joints in the same place; their weights are bytes that do not add up to 255.
+        let weights = json!({ "componentType": 5121, "normalized": true, "count": count, "type": "VEC4" });
+        let weights = add(&mut document, &mut binary, &[200u8, 50, 0, 0].repeat(count), weights);
+        let mut matrix = [0.0f32; 16];
+        (matrix[0], matrix[5], matrix[10], matrix[15]) = (bind, bind.abs(), bind.abs(), 1.0);
+        let matrix: Vec<u8> = matrix.repeat(2).iter().flat_map(|x: &f32| x.to_le_bytes()).collect();
+        let bind = add(
+            &mut document,
+            &mut binary,
+            &matrix,
+            json!({ "componentType": 5126, "count": 2, "type": "MAT4" }),
+        );
+        let attributes = &mut document["meshes"][0]["primitives"][0]["attributes"];
+        (attributes["JOINTS_0"], attributes["WEIGHTS_0"]) = (joints.into(), weights.into());
+        let joint = json!({ "scale": [joint, joint, joint], "rotation": [0.6, 0.0, 0.0, 0.8] });
+        document["nodes"] = json!([
+            { "mesh": 0, "skin": 0, "scale": [7.0, 7.0, 7.0] },
+            { "children": [2, 3], "scale": [parent, parent, parent], "translation": [3.0, 0.0, 0.0] },
+            joint.clone(),
+            joint,
+        ]);
+        document["scenes"][0]["nodes"] = json!([0, 1]);
+        document["skins"] = json!([{ "joints": [2, 3], "inverseBindMatrices": bind }]);
+        let model = folder.path().join(format!("skin{i}.glb"));
+        write_glb(&model, document, binary);
+
+        let [min, max] = Scene::load(&model).unwrap().bounds().unwrap();
+        assert!((max - min - 0.02).abs().max_element() < 1e-5, "case {i}: from {min} to {max}");
+        assert!(
+            (0.5 * (min + max) - 3.0 * Vec3::X).abs().max_element() < 1e-5,
+            "case {i}: from {min} to {max}"
+        );
+        let out = folder.path().join("out");
+        done(&["--quiet", "bake", str(&model), "-o", str(&out), "--skin", "all", "--curvature-blur", "none"]);
+        let scene = Scene::load(out.join(format!("skin{i}.glb"))).unwrap();
+        let primitive = &scene.primitives[0];
+        let curvature = primitive.curvature.as_ref().unwrap();
+        assert!((curvature.millimetres - 1000.0).abs() < 0.1, "case {i}: {} mm", curvature.millimetres);
+        for (vertex, &code) in curvature.codes.iter().enumerate() {
+            let (tensor, mean) = curvature_decode(code, curvature.range);
+            let error = (tensor.xx - 0.1).abs().max((tensor.yy - 0.1).abs()).max((mean - 0.1).abs());
+            assert!(
+                error < 0.0015,
+                "case {i}, vertex {vertex} at {}: {tensor:?}, {mean}",
+                primitive.positions[vertex]
+            );
+            let along = primitive.tangents[vertex].truncate().dot(primitive.normals[vertex]);
+            assert!(along.abs() < 1e-3, "case {i}: a tangent leaves its surface");
+        }
+        for triangle in &primitive.triangles {
+            let [a, b, c] = triangle.map(|i| primitive.positions[i as usize]);
+            let out = (b - a).cross(c - a).dot(primitive.normals[triangle[0] as usize]);
+            assert!(out >= 0.0, "case {i}: a face is turned inside out");
+        }
+    }
+}
+
 /// One half of a sphere mirrors the texture of the other: on the line between them MikkTSpace wants two tangents where
 /// the file has one vertex.
 #[test]

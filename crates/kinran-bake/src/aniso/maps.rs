@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3, vec2, vec3};
-use kinran_image::{Image, Pixels};
+use kinran_image::{Channels, Image, Pixels};
 use kinran_scene::Wrap;
 use kinran_shading::{
     ALPHA_MIN, Sym2, alpha_from_roughness, alphas_from_khr_anisotropy, aniso_decode_matrix,
@@ -78,11 +78,24 @@ pub enum RoughnessMaps {
     Encoded(Arc<Image>),
 }
 
+/// Where z of a normal map's vectors comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NormalZ {
+    /// From red and green and unit length, as shaders rebuild it.
+    #[default]
+    Rebuilt,
+    /// From blue, and red, green and blue are brought to unit length together, as glTF 2.0 section 3.9.3 has it. A vector that
+    /// points into the surface is laid on it. An image without blue has z rebuilt.
+    Blue,
+}
+
 /// A tangent-space normal map.
 #[derive(Clone, Debug)]
 pub struct NormalMap {
-    /// RG, or RGB whose blue is ignored: z follows from unit length. Absent: flat.
+    /// RG, or RGB whose blue counts as `z` says. Absent: flat.
     pub image: Option<Arc<Image>>,
+    /// Where z comes from.
+    pub z: NormalZ,
     /// Green grows downwards (DirectX) instead of upwards (glTF, OpenGL).
     pub y_down: bool,
     /// Samples are components in [−1, 1] (float images that hold negative numbers), not mapped to [0, 1].
@@ -95,13 +108,18 @@ pub struct NormalMap {
 impl NormalMap {
     /// No map: (0, 0, 1) everywhere.
     pub fn flat() -> Self {
-        NormalMap { image: None, y_down: false, signed: false, scale: 1.0 }
+        NormalMap { image: None, z: NormalZ::Rebuilt, y_down: false, signed: false, scale: 1.0 }
     }
 
-    /// A map of scale 1; signed if it is a float image with a negative sample.
+    /// A map of scale 1, of which z is rebuilt; signed if it is a float image with a negative sample.
     pub fn new(image: Arc<Image>, y_down: bool) -> Self {
         let signed = matches!(&image.pixels, Pixels::F32(data) if data.iter().any(|v| *v < 0.0));
-        NormalMap { image: Some(image), y_down, signed, scale: 1.0 }
+        NormalMap { image: Some(image), z: NormalZ::Rebuilt, y_down, signed, scale: 1.0 }
+    }
+
+    /// A glTF `normalTexture` with its `scale`.
+    pub fn gltf(image: Arc<Image>, scale: f32) -> Self {
+        NormalMap { z: NormalZ::Blue, scale, ..NormalMap::new(image, false) }
     }
 }
 
@@ -238,10 +256,22 @@ impl SurfaceMaps {
             nz.fill(1.0);
             return;
         };
-        read_channels(image, [0, 1], at, [&mut *nx, &mut *ny]);
         let (gain, offset) = if self.normal.signed { (1.0, 0.0) } else { (2.0, -1.0) };
         let (y_gain, y_offset) = if self.normal.y_down { (-gain, -offset) } else { (gain, offset) };
         let scale = self.normal.scale;
+        if self.normal.z == NormalZ::Blue && image.channels >= Channels::Rgb {
+            read_channels(image, [0, 1, 2], at, [&mut *nx, &mut *ny, &mut *nz]);
+            for ((x, y), z) in nx.iter_mut().zip(&mut *ny).zip(&mut *nz) {
+                let (vx, vy) = ((*x * gain + offset) * scale, (*y * y_gain + y_offset) * scale);
+                let vz = (*z * gain + offset).max(0.0);
+                let length = (vx * vx + vy * vy + vz * vz).sqrt();
+                // Without a direction the surface is flat.
+                let (unit, flat) = if length > 0.0 { (length.recip(), 0.0) } else { (0.0, 1.0) };
+                (*x, *y, *z) = (vx * unit, vy * unit, vz * unit + flat);
+            }
+            return;
+        }
+        read_channels(image, [0, 1], at, [&mut *nx, &mut *ny]);
         // Vectors longer than one are rare: the loop that looks for them spares the others a root and a division.
         let mut any = 0;
         for ((x, y), z) in nx.iter_mut().zip(&mut *ny).zip(&mut *nz) {

@@ -14,7 +14,7 @@ mod sheet;
 pub use bake::{BakedSurface, LevelError, SheetRequest, SurfaceOptions, bake_surface};
 pub use footprint::{Kernel, Taps, footprints, reduction};
 pub use levels::{Band, Filter, coarser_levels, filter_levels};
-pub use maps::{DirectionMap, NormalMap, RoughnessMaps, ScalarMap, SurfaceMaps, TexelSpan};
+pub use maps::{DirectionMap, NormalMap, NormalZ, RoughnessMaps, ScalarMap, SurfaceMaps, TexelSpan};
 pub use ml::MAX_AXIS_TEXELS;
 pub use ndf_error::ndf_error;
 pub use sheet::{Sheet, decode_aniso, decode_khr};

@@ -9,12 +9,12 @@ use kinran_scene::Wrap;
 use kinran_shading::{alpha_from_roughness, alphas_from_khr_anisotropy};
 use rayon::prelude::*;
 
-use super::evidence::{green_correlation, guess_by_correlation, is_grey, not_normals};
+use super::evidence::{green_correlation, guess_by_correlation, is_grey, not_normals, odd_lengths};
 use super::{
     BaseRoughness, DirectionSource, FolderError, Green, GreenGuess, GreenSource, LevelSource, MapChannel,
     MaterialMaps, NormalSource, Role, RoughnessSource,
 };
-use crate::aniso::{DirectionMap, NormalMap, RoughnessMaps, ScalarMap, SurfaceMaps};
+use crate::aniso::{DirectionMap, NormalMap, NormalZ, RoughnessMaps, ScalarMap, SurfaceMaps};
 use crate::channels::{Place, read_channel};
 
 /// A file that a material uses.
@@ -140,7 +140,15 @@ fn normal_map(
         }
         (false, _) => {}
     }
-    Ok(NormalMap::new(image.clone(), source.green == Green::Down))
+    if let Some(lengths) = odd_lengths(image) {
+        notes.push(match source.z {
+            NormalZ::Rebuilt => format!(
+                "{name}: {lengths}; z is rebuilt from red and green, say --normal-blue if blue is right, as it is in glTF"
+            ),
+            NormalZ::Blue => format!("{name}: {lengths}; red, green and blue are brought to it together"),
+        });
+    }
+    Ok(NormalMap { z: source.z, ..NormalMap::new(image.clone(), source.green == Green::Down) })
 }
 
 /// One channel of a map as it is.

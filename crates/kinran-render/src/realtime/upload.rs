@@ -354,8 +354,7 @@ fn material_floats(m: &RenderMaterial, adjustment: Adjustment, curvature_range: 
     };
     let mut floats = m.base_color_factor.to_array().to_vec();
     floats.extend(m.emissive_factor.extend(m.occlusion_strength).to_array());
-    let transmissive = f32::from(u8::from(m.transmissive));
-    floats.extend([m.metallic_factor, m.roughness_factor, cutoff, transmissive]);
+    floats.extend([m.metallic_factor, m.roughness_factor, cutoff, m.transmission]);
     let (surface, strength, rotation) = match m.surface.as_ref().map(|surface| surface.encoding) {
         None => (0, 0.0, 0.0),
         Some(AnisoEncoding::Texel) => (1, 0.0, 0.0),
@@ -491,7 +490,7 @@ fn path(m: &RenderMaterial) -> Path {
         };
         t.factor > 0.0 && !(same_map && t.color_factor == m.base_color_factor.truncate())
     });
-    if m.alpha_mode == AlphaMode::Blend || m.transmissive {
+    if m.alpha_mode == AlphaMode::Blend || m.transmission > 0.0 {
         Path::Blended
     } else if m.surface.is_some()
         || own_color

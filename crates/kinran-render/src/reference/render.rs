@@ -210,7 +210,7 @@ fn check_fuzz(scene: &RenderScene) -> Result<(), Error> {
 }
 
 fn lets_light_through(material: &RenderMaterial) -> bool {
-    material.alpha_mode != AlphaMode::Opaque || material.transmissive
+    material.alpha_mode != AlphaMode::Opaque || material.transmission > 0.0
 }
 
 struct Renderer<'a> {

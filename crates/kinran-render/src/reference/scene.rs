@@ -102,8 +102,9 @@ pub struct RenderMaterial {
     pub alpha_mode: AlphaMode,
     /// Both sides are lit; otherwise back faces are invisible.
     pub double_sided: bool,
-    /// Light that is not reflected passes through unbent, tinted by the base colour: thin clear glass.
-    pub transmissive: bool,
+    /// The share of the light that is not reflected which passes through unbent, tinted by the base colour: 1 is thin clear
+    /// glass.
+    pub transmission: f32,
     /// Fibres over all that.
     pub fuzz: Option<RenderFuzz>,
     /// Maps blended from tiles, in the place of those above.
@@ -155,8 +156,6 @@ impl RenderScene {
     /// Prepares a scene. `surfaces` holds one entry for each of the scene's materials.
     ///
     /// Colours and masks that have runtime textures are drawn with their mips, others with box-filtered ones.
-    /// `KHR_materials_transmission`, which [`Material`] does not represent, makes a material
-    /// [`transmissive`](RenderMaterial::transmissive).
     ///
     /// # Errors
     /// Those of [`Geometry::new`], and [`Error::Scene`] when `surfaces` is not as long as the materials or a
@@ -335,7 +334,7 @@ impl TextureLoader<'_> {
                     })
                 }
             },
-            transmissive: m.ignored_extensions.iter().any(|e| e == "KHR_materials_transmission"),
+            transmission: m.transmission,
         })
     }
 }

@@ -102,7 +102,7 @@ pub(crate) fn shadow_transmittance(
 ) -> Vec3 {
     let base = base_color(material, point, filtering);
     let opacity = opacity(material, base);
-    let through = if material.transmissive { base.xyz() * (1.0 - DIELECTRIC_F0) } else { Vec3::ZERO };
+    let through = base.xyz() * ((1.0 - DIELECTRIC_F0) * material.transmission);
     Vec3::splat(1.0 - opacity) + opacity * through
 }
 
@@ -181,7 +181,7 @@ impl Shading {
             }
             None => (passed, Vec3::ZERO),
         };
-        let opaque = f32::from(u8::from(!material.transmissive));
+        let opaque = 1.0 - material.transmission;
         let diffuse = scattered * opaque;
         let fuzz = (material.fuzz.as_ref())
             .and_then(|fuzz| FuzzAt::new(fuzz, point, filtering, to_world, frame, v, diffuse));

@@ -7,7 +7,7 @@ use kinran_bake::curvature::{
     uniform_scale,
 };
 use kinran_image::{Channels, Image, Pixels, write_atomically, write_exr};
-use kinran_scene::{Attribute, Document, Primitive, Scene, Skin};
+use kinran_scene::{Attribute, Document, Maps, Needs, Pose, Primitive, Scene, Skin};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -15,6 +15,9 @@ use serde_json::{Value, json};
 use super::file_stem;
 use crate::values::number;
 use crate::{Console, Error};
+
+/// The extension that makes a material skin.
+const SKIN: &str = "KINRAN_materials_skin";
 
 /// Flags about skin and curvature.
 #[derive(Clone, Debug, PartialEq, clap::Args)]
@@ -109,6 +112,16 @@ impl From<MethodName> for Method {
 }
 
 impl CurvatureArgs {
+    /// Whether any of a document's primitives can get curvature.
+    pub(super) fn asks(&self, document: &Document) -> bool {
+        let is_skin = |i| document.material(i).get("extensions").is_some_and(|e| e.get(SKIN).is_some());
+        match self.curvature {
+            Which::Skin => !self.skin.is_empty() || (0..document.material_count()).any(is_skin),
+            Which::All => true,
+            Which::None => false,
+        }
+    }
+
     /// Whether a primitive gets curvature.
     pub(super) fn wants(&self, scene: &Scene, primitive: &Primitive) -> bool {
         match self.curvature {
@@ -170,11 +183,14 @@ pub(super) fn with_normals(args: &super::Args) -> Result<Option<tempfile::TempDi
     if !args.curvature.estimate_normals {
         return Ok(None);
     }
-    let scene = Scene::load_allowing(input, allowed)?;
+    // Normals are the mesh's own, whatever its joints make of them.
+    let needs = Needs { geometry: true, rest_pose: false, maps: Maps::None };
+    let scene = Scene::load_part(input, allowed, &needs)?;
     if !scene.primitives.iter().any(|p| p.source.lacks_normals) {
         return Ok(None);
     }
     let mut document = Document::open_allowing(input, allowed)?;
+    document.decompress()?;
     for mesh in meshes(&scene) {
         let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
         let surface = Joined::new(&group);
@@ -220,9 +236,9 @@ pub(super) fn mark_skin(
             scene.materials[i].skin.get_or_insert_with(Skin::default);
             let extensions = document.material_mut(i).entry("extensions").or_insert_with(|| json!({}));
             if let Some(extensions) = extensions.as_object_mut() {
-                extensions.entry("KINRAN_materials_skin").or_insert_with(|| json!({}));
+                extensions.entry(SKIN).or_insert_with(|| json!({}));
             }
-            document.use_extension("KINRAN_materials_skin", false);
+            document.use_extension(SKIN, false);
         }
     }
     Ok(())
@@ -234,7 +250,7 @@ pub(super) fn mark_skin(
 /// Where there is no mesh, or one without normals.
 pub(super) fn check(args: &super::Args, scene: &Scene, document: &Document) -> Result<Vec<String>, Error> {
     let flags = &args.curvature;
-    let mut wanted = meshes(scene);
+    let mut wanted = largest(scene, &mut Vec::new(), |mesh| mesh_name(document, mesh));
     wanted.retain(|mesh| mesh.iter().any(|&i| flags.wants(scene, &scene.primitives[i])));
     if wanted.is_empty() && (!flags.skin.is_empty() || flags.curvature == Which::All) {
         return Err(Error::Usage(format!(
@@ -279,8 +295,9 @@ pub(super) fn bake(
     let flags = &args.curvature;
     let wanted = |p: &Primitive| flags.wants(scene, p);
     let mut reports = Vec::new();
+    let groups = largest(scene, warnings, |mesh| mesh_name(document, mesh));
     let groups: Vec<Vec<usize>> =
-        meshes(scene).into_iter().filter(|mesh| mesh.iter().any(|&i| wanted(&scene.primitives[i]))).collect();
+        groups.into_iter().filter(|mesh| mesh.iter().any(|&i| wanted(&scene.primitives[i]))).collect();
     let stage = console.progress().stage("curvature", groups.len() as u64);
     for mesh in groups {
         let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
@@ -290,7 +307,7 @@ pub(super) fn bake(
         let millimetres = flags.unit_mm.map_or_else(|| unit(scene, &mesh, &name, warnings), f64::from);
         let options = Options {
             method: flags.curvature_method.into(),
-            millimetres,
+            millimetres: millimetres / pose_scale(group[0]),
             blur: flags.curvature_blur.as_ref().map_or_else(|| BLUR.to_vec(), |blur| blur.0.clone()),
             clamp: true,
         };
@@ -328,16 +345,60 @@ pub(super) fn bake(
     Ok(reports)
 }
 
-/// The scene's primitives of each mesh, in the document's order.
+/// The scene's primitives of each mesh, in the document's order; those that different skins hold are apart.
 pub(crate) fn meshes(scene: &Scene) -> Vec<Vec<usize>> {
-    let mut meshes: Vec<Vec<usize>> = Vec::new();
-    for (i, primitive) in scene.primitives.iter().enumerate() {
-        match meshes.last_mut() {
-            Some(last) if scene.primitives[last[0]].source.mesh == primitive.source.mesh => last.push(i),
-            _ => meshes.push(vec![i]),
+    let key = |i: usize| {
+        let source = &scene.primitives[i].source;
+        (source.mesh, source.pose.as_ref().map(|pose| pose.skin))
+    };
+    let all: Vec<usize> = (0..scene.primitives.len()).collect();
+    all.chunk_by(|&a, &b| key(a) == key(b)).map(<[usize]>::to_vec).collect()
+}
+
+/// Of each of the document's meshes that of [`meshes`] which stands largest in the world.
+fn largest(scene: &Scene, warnings: &mut Vec<String>, name: impl Fn(usize) -> String) -> Vec<Vec<usize>> {
+    let mut chosen: Vec<Vec<usize>> = Vec::new();
+    for mesh in meshes(scene) {
+        let same = |other: &Vec<usize>| {
+            scene.primitives[other[0]].source.mesh == scene.primitives[mesh[0]].source.mesh
+        };
+        let Some(other) = chosen.last_mut().filter(|other| same(other)) else {
+            chosen.push(mesh);
+            continue;
+        };
+        let [size, other_size] = [&mesh, &*other].map(|mesh| sizes(scene, mesh).1);
+        if size.max(other_size) > SAME_SIZE * size.min(other_size) {
+            warnings.push(several_sizes(&name(scene.primitives[mesh[0]].source.mesh)));
+        }
+        if size > other_size {
+            *other = mesh;
         }
     }
-    meshes
+    chosen
+}
+
+/// Sizes whose ratio is below it are one; chosen by eye.
+const SAME_SIZE: f64 = 1.01;
+
+fn several_sizes(name: &str) -> String {
+    format!("{name} stands at several sizes; curvature is that of the largest, --unit-mm sets another")
+}
+
+/// Size in the scene over size in the document of a primitive.
+pub(crate) fn pose_scale(primitive: &Primitive) -> f64 {
+    primitive.source.pose.as_ref().map(|pose| pose.scale).filter(|scale| *scale > 0.0).unwrap_or(1.0)
+}
+
+/// The smallest and the largest size in the world over that in the document at which a mesh stands, and whether it is
+/// stretched anywhere; no size where it stands nowhere.
+fn sizes(scene: &Scene, mesh: &[usize]) -> (f64, f64, bool) {
+    let placed = scene.instances.iter().filter(|i| mesh.contains(&i.primitive));
+    placed.fold((f64::INFINITY, 0.0, false), |(smallest, largest, stretched), instance| {
+        let m = instance.transform.matrix3;
+        let (scale, uniform) = uniform_scale([m.x_axis.into(), m.y_axis.into(), m.z_axis.into()]);
+        let scale = scale * pose_scale(&scene.primitives[instance.primitive]);
+        (smallest.min(scale), largest.max(scale), stretched || !uniform)
+    })
 }
 
 /// Primitives as one surface.
@@ -371,26 +432,16 @@ impl Joined {
     }
 }
 
-/// Millimetres in a mesh's unit: a metre times the scale of where it stands.
+/// Millimetres in the unit of the document's mesh: a metre times the scale of where it stands.
 pub(crate) fn unit(scene: &Scene, mesh: &[usize], name: &str, warnings: &mut Vec<String>) -> f64 {
-    let placed = scene.instances.iter().filter(|i| mesh.contains(&i.primitive));
-    let scales: Vec<(f64, bool)> = placed
-        .map(|i| {
-            let m = i.transform.matrix3;
-            uniform_scale([m.x_axis.into(), m.y_axis.into(), m.z_axis.into()])
-        })
-        .collect();
-    let largest = scales.iter().map(|s| s.0).fold(0.0, f64::max);
-    let smallest = scales.iter().map(|s| s.0).fold(f64::INFINITY, f64::min);
-    if scales.iter().any(|s| !s.1) {
+    let (smallest, largest, stretched) = sizes(scene, mesh);
+    if stretched {
         warnings.push(format!(
             "{name} is stretched by its node; curvature is that of the mesh, not of its picture"
         ));
     }
-    if largest > 1.01 * smallest {
-        warnings.push(format!(
-            "{name} stands at several sizes; curvature is that of the largest, --unit-mm sets another"
-        ));
+    if largest > SAME_SIZE * smallest {
+        warnings.push(several_sizes(name));
     }
     1000.0 * if largest > 0.0 { largest } else { 1.0 }
 }
@@ -431,15 +482,22 @@ fn put(
     let mut taken = vec![false; count];
     let split = place.iter().any(|&v| std::mem::replace(&mut taken[v], true));
     if split {
-        document.gather_vertices(mesh, number, &source.vertices, &primitive.triangles)?;
+        let mirrored = source.pose.as_ref().is_some_and(|pose| pose.mirrored);
+        let own = |&[a, b, c]: &[u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+        let triangles: Vec<[u32; 3]> = primitive.triangles.iter().map(own).collect();
+        document.gather_vertices(mesh, number, &source.vertices, &triangles)?;
         count = primitive.positions.len();
         place = (0..count).collect();
     }
     let mut bytes = vec![[0u8, 128, 0, 0]; count];
     let mut tangents = vec![Vec4::new(1.0, 0.0, 0.0, 1.0); count];
+    let own: &[Vec4] = match &source.pose {
+        Some(Pose { tangents, .. }) => tangents,
+        None => &primitive.tangents,
+    };
     for (vertex, &at) in place.iter().enumerate() {
         bytes[at] = codes[vertex];
-        tangents[at] = primitive.tangents[vertex];
+        tangents[at] = own[vertex];
     }
     if source.lacks_tangents {
         document.set_attribute(mesh, number, "TANGENT", Attribute::Float4(&tangents));

@@ -3,12 +3,15 @@
 use std::path::Path;
 
 use kinran_bake::aniso::{RoughnessMaps, Sheet, SheetRequest, bake_surface};
+use kinran_bake::folder::{Green, GreenGuess, guess_green, odd_lengths};
 use kinran_bake::{MaterialSurface, NoSurface, bake_plain, material_surface};
 use kinran_image::{
     Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Role, Texture, Transfer, full_level_count,
     level_size, write_png,
 };
-use kinran_scene::{Document, FUZZ_EXTENSION, Material, Scene, Slot, TextureExtension, TextureRef};
+use kinran_scene::{
+    Document, FUZZ_EXTENSION, Maps, Material, Needs, Scene, Slot, TextureExtension, TextureRef,
+};
 use serde_json::Value;
 
 use super::report::BakeReport;
@@ -177,7 +180,8 @@ fn planned(scene: &Scene, m: &Material, surface: &MaterialSurface) -> Vec<Planne
     // Factors are baked into the textures; an image that showed level 0 without them is replaced.
     let mut planned = Vec::new();
     if m.normal.is_some() {
-        planned.push(Planned { sheet: Sheet::Normal, slot: Slot::Normal, changed: m.normal_scale != 1.0 });
+        let changed = m.normal_scale != 1.0 || surface.maps.normal.y_down;
+        planned.push(Planned { sheet: Sheet::Normal, slot: Slot::Normal, changed });
     }
     planned.push(Planned {
         sheet: if directed { Sheet::Roughness } else { Sheet::IsotropicRoughness },
@@ -250,8 +254,20 @@ fn read(args: &Args) -> Result<(Option<tempfile::TempDir>, Scene, Document), Err
     let smoothed = curvature::with_normals(args)?;
     let input =
         smoothed.as_ref().map_or_else(|| args.input.clone(), |f| f.path().join(file_name(&args.input)));
-    let mut scene = Scene::load_allowing(&input, args.model.allowed()?)?;
-    let mut document = Document::open_allowing(&input, args.model.allowed()?)?;
+    let allowed = args.model.allowed()?;
+    let mut document = Document::open_allowing(&input, allowed)?;
+    let needs = Needs {
+        geometry: args.curvature.asks(&document),
+        rest_pose: true,
+        maps: if args.all_textures { Maps::Plain } else { Maps::Surface },
+    };
+    let mut scene = Scene::load_part(&input, allowed, &needs)?;
+    if needs.geometry && document.decompress()? {
+        scene.warnings.push(
+            "its meshes were compressed by Draco or meshopt; they are written plain, since curvature is added to them"
+                .into(),
+        );
+    }
     curvature::mark_skin(&args.curvature, &mut scene, &mut document)?;
     Ok((smoothed, scene, document))
 }
@@ -265,28 +281,64 @@ fn surfaces(
 ) -> Vec<(Key, Vec<usize>, MaterialSurface)> {
     report.warnings.clone_from(&scene.warnings);
     let mut surfaces: Vec<(Key, Vec<usize>, MaterialSurface)> = Vec::new();
+    let mut apart = false;
     // A document without materials has one in the scene that it cannot name.
     for material in 0..document.material_count().min(scene.materials.len()) {
         match material_surface(scene, material) {
-            Ok(surface) => {
+            // Factors alone need no texture.
+            Ok(surface) if surface.place.is_none() => {}
+            Ok(mut surface) => {
                 let key = Key::new(scene, material);
+                surface.maps.normal.y_down = args.y_down;
+                report.warnings.extend(normal_remarks(
+                    &scene.materials[material].name,
+                    &surface,
+                    args.green(),
+                ));
                 match surfaces.iter_mut().find(|(known, ..)| *known == key) {
                     Some((_, materials, _)) => materials.push(material),
                     None => surfaces.push((key, vec![material], surface)),
                 }
             }
             Err(NoSurface::Plain) => {}
-            Err(NoSurface::Apart(reason)) => report.warnings.push(reason),
+            Err(NoSurface::Apart(reason)) => {
+                report.warnings.push(reason);
+                apart = true;
+            }
         }
     }
     let skin = scene.primitives.iter().any(|p| args.curvature.wants(scene, p));
-    if surfaces.is_empty() && !args.all_textures && !skin {
+    if !apart && surfaces.is_empty() && !args.all_textures && !skin {
         report.warnings.push(format!(
             "{}: no material has a normal or an anisotropy map; nothing but --all-textures would bake anything",
             file_name(&args.input)
         ));
     }
     surfaces
+}
+
+/// What the texels of a material's normal map say against it.
+pub(crate) fn normal_remarks(material: &str, surface: &MaterialSurface, said: Option<Green>) -> Vec<String> {
+    let Some(image) = &surface.maps.normal.image else { return Vec::new() };
+    let guess = guess_green(image);
+    let green = match (guess, said) {
+        (GreenGuess::Down, None) => Some(
+            "the slopes of its normal map say that green points down, as in DirectX, and glTF's points up; if they \
+             are right, bake it with --y-down",
+        ),
+        (GreenGuess::Down, Some(Green::Up)) => {
+            Some("its normal map is taken as +Y by --y-up, though its slopes look like -Y")
+        }
+        (GreenGuess::Up, Some(Green::Down)) => {
+            Some("its normal map is taken as -Y by --y-down, though its slopes look like +Y")
+        }
+        _ => None,
+    };
+    let lengths = odd_lengths(image).map(|lengths| {
+        format!("its normal map: {lengths}; red, green and blue are brought to it together, as in glTF")
+    });
+    let remarks = green.map(str::to_owned).into_iter().chain(lengths);
+    remarks.map(|remark| format!("material \"{material}\": {remark}")).collect()
 }
 
 /// What makes two materials' surfaces the same.
@@ -320,7 +372,10 @@ impl Key {
 /// Whether occlusion is read from the metallic-roughness texture.
 fn occlusion_is_packed(scene: &Scene, material: usize) -> bool {
     let m = &scene.materials[material];
-    m.occlusion.is_some() && m.occlusion == m.metallic_roughness
+    match (&m.occlusion, &m.metallic_roughness) {
+        (Some(o), Some(r)) => (o.image, o.runtime) == (r.image, r.runtime) && o.lies_as(r),
+        _ => false,
+    }
 }
 
 /// File names given so far.
@@ -346,6 +401,9 @@ struct SurfaceBaker<'a> {
     /// Files besides the textures.
     written: &'a mut Vec<WrittenFile>,
 }
+
+/// Where the maps of a surface are, in the order in which [`material_surface`] takes their place for the surface's.
+const SURFACE_SLOTS: [Slot; 3] = [Slot::Normal, Slot::Anisotropy, Slot::MetallicRoughness];
 
 /// A sheet, the slot it goes to, and whether the slot's image no longer shows level 0.
 struct Planned {
@@ -413,7 +471,7 @@ impl SurfaceBaker<'_> {
         let mut fallback = textures.split_off(planned.len()).into_iter();
         for (planned, texture) in planned.iter().zip(textures) {
             let image = if planned.changed { fallback.next() } else { None };
-            report.outputs.extend(self.place(planned, texture, image, materials, &surface.place)?);
+            report.outputs.extend(self.place(planned, texture, image, materials)?);
         }
         if let Some(aniso) = aniso {
             let outputs = write_texture(args, &format!("{}_aniso", self.name), Content::Aniso, aniso)?;
@@ -430,7 +488,6 @@ impl SurfaceBaker<'_> {
         texture: Texture,
         fallback: Option<Texture>,
         materials: &[usize],
-        place: &TextureRef,
     ) -> Result<Vec<Output>, Error> {
         let map = Content::from(planned.sheet);
         let name = format!("{}_{}", self.name, map.name());
@@ -447,27 +504,27 @@ impl SurfaceBaker<'_> {
             None => old.and_then(|texture| self.document.texture_image(texture)),
         };
         let alternatives = alternatives(self.document, &outputs);
-        let other = |slot| self.document.texture(materials[0], slot);
-        let like = old.or_else(|| other(Slot::Normal)).or_else(|| other(Slot::Anisotropy));
+        let other = |slot: &Slot| self.document.texture(materials[0], *slot);
+        let like = old.or_else(|| SURFACE_SLOTS.iter().find_map(other));
         let new = self.document.add_texture(like, source, &alternatives);
         for &material in materials {
-            let had = self.document.texture(material, planned.slot).is_some();
+            let is_new = self.document.texture(material, planned.slot).is_none();
+            let like = is_new.then(|| like_surface(self.document.material(material)));
             let occlusion =
                 planned.slot == Slot::MetallicRoughness && occlusion_is_packed(self.scene, material);
             self.document.set_texture(material, planned.slot, new);
             if occlusion {
                 self.document.set_texture(material, Slot::Occlusion, new);
             }
-            reset_factors(self.document.material_mut(material), planned.slot, (!had).then_some(place));
+            reset_factors(self.document.material_mut(material), planned.slot, like);
         }
         Ok(outputs)
     }
 
-    /// Refers to an aniso texture, which lies as the normal map does, or as the anisotropy map where there is none.
+    /// Refers to an aniso texture, which lies as the first map of [`SURFACE_SLOTS`] does.
     fn place_aniso(&mut self, outputs: &[Output], materials: &[usize]) {
         let alternatives = alternatives(self.document, outputs);
-        let slots = [Slot::Normal, Slot::Anisotropy];
-        let like = slots.iter().find_map(|&slot| self.document.texture(materials[0], slot));
+        let like = SURFACE_SLOTS.iter().find_map(|&slot| self.document.texture(materials[0], slot));
         let new = self.document.add_optional_texture(like, &alternatives);
         for &material in materials {
             self.document.set_texture(material, Slot::Aniso, new);
@@ -518,23 +575,22 @@ fn alternatives(document: &mut Document, outputs: &[Output]) -> Vec<(TextureExte
         .collect()
 }
 
-/// Where a material's normal map lies on the mesh, or its anisotropy map where there is none.
+/// Where the first map of a material's [`SURFACE_SLOTS`] lies on the mesh.
 fn like_surface(material: &kinran_scene::Object) -> kinran_scene::Object {
     let anisotropy = (material.get("extensions"))
         .and_then(|e| e.get("KHR_materials_anisotropy")?.get("anisotropyTexture"));
-    let texture = material.get("normalTexture").or(anisotropy).and_then(Value::as_object);
+    let roughness = material.get("pbrMetallicRoughness").and_then(|pbr| pbr.get("metallicRoughnessTexture"));
+    let texture = material.get("normalTexture").or(anisotropy).or(roughness).and_then(Value::as_object);
     let mut like = texture.cloned().unwrap_or_default();
     like.retain(|key, _| key == "texCoord" || key == "extensions");
     like
 }
 
-/// Sets the factors that are in the texture now to one, and lays a texture that is new on the mesh as `place`
-/// says.
-fn reset_factors(material: &mut kinran_scene::Object, slot: Slot, place: Option<&TextureRef>) {
-    let like = like_surface(material);
+/// Sets the factors that are in the texture now to one, and lays a texture that is new on the mesh as `like` says.
+fn reset_factors(material: &mut kinran_scene::Object, slot: Slot, like: Option<kinran_scene::Object>) {
     let lay = |texture: Option<&mut Value>| {
-        if let (Some(texture), Some(_)) = (texture.and_then(Value::as_object_mut), place) {
-            texture.extend(like.clone());
+        if let (Some(texture), Some(like)) = (texture.and_then(Value::as_object_mut), like) {
+            texture.extend(like);
         }
     };
     match slot {

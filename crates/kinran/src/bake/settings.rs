@@ -6,7 +6,7 @@ use clap::{ArgAction, CommandFactory, Parser};
 use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError, Setting, SettingValue};
 use kinran_image::{Encoding, Role};
 
-use super::Args;
+use super::{Args, FOLDER_FLAGS};
 use crate::Error;
 use crate::detail::{BlockFormat, SolveArgs, default_format};
 use crate::skin_lut;
@@ -196,6 +196,14 @@ fn words(manifest: &Manifest, kind: Kind, setting: &Setting) -> Result<Vec<Strin
         }
         return Err(manifest.error(&setting.place, unknown(&command, name)));
     };
+    if kind == Kind::Mesh && FOLDER_FLAGS.contains(&name.as_str()) {
+        if setting.is_default {
+            return Ok(Vec::new());
+        }
+        let reason =
+            format!("`{name}` is about folders of maps, and a glTF file says it itself; leave it out");
+        return Err(manifest.error(&setting.place, reason));
+    }
     let is_switch = matches!(argument.get_action(), ArgAction::SetTrue);
     match &setting.value {
         SettingValue::Switch(true) if is_switch => Ok(vec![format!("--{name}")]),

@@ -74,7 +74,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             role.name()
         )));
     }
-    if is(&["glb", "gltf", "obj"]) {
+    if kinran_scene::is_gltf(&args.file) || is(&["obj"]) {
         model::inspect(&args.file, args.model.allowed()?, console)
     } else if is(&IMAGES) {
         image::inspect(&args.file, console)

@@ -9,6 +9,7 @@ use kinran_scene::{Document, LightKind, Material, Scene, TextureRef};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::bake::normal_remarks;
 use crate::render::triangles;
 use crate::table::list;
 use crate::view::file_name;
@@ -86,6 +87,10 @@ pub(super) fn inspect(path: &Path, allowed: &[PathBuf], console: &Console) -> Re
         bake: bake(&scene, i),
         ignored_extensions: m.ignored_extensions.clone(),
     });
+    let remarks = scene.materials.iter().enumerate().flat_map(|(i, m)| match material_surface(&scene, i) {
+        Ok(surface) => normal_remarks(&m.name, &surface, None),
+        Err(_) => Vec::new(),
+    });
     let cameras = scene.cameras.iter().map(|camera| CameraReport {
         position: camera.transform.translation.to_array(),
         yfov_degrees: camera.yfov.to_degrees(),
@@ -106,7 +111,7 @@ pub(super) fn inspect(path: &Path, allowed: &[PathBuf], console: &Console) -> Re
         lights: lights.collect(),
         extensions_used: strings("extensionsUsed"),
         extensions_required: strings("extensionsRequired"),
-        warnings: scene.warnings.clone(),
+        warnings: scene.warnings.iter().cloned().chain(remarks).collect(),
     };
     let text = text(&report);
     console.result(&super::Report::Model(report), &text)
@@ -148,6 +153,7 @@ fn maps(scene: &Scene, m: &Material) -> Vec<MapReport> {
 /// What `kinran bake` does with a material, in words.
 fn bake(scene: &Scene, material: usize) -> String {
     match material_surface(scene, material) {
+        Ok(surface) if surface.place.is_none() => "nothing: its anisotropy is in factors alone".into(),
         Ok(surface) => {
             let (width, height) = surface.maps.size();
             let what = match surface.maps.roughness {
@@ -156,7 +162,7 @@ fn bake(scene: &Scene, material: usize) -> String {
             };
             format!("{what}, {width}x{height}, {} levels", full_level_count(width, height))
         }
-        Err(NoSurface::Plain) => "nothing: it has neither a normal nor an anisotropy map".into(),
+        Err(NoSurface::Plain) => "nothing: it has no normal map and is isotropic".into(),
         Err(NoSurface::Apart(reason)) => format!("nothing: {reason}"),
     }
 }
