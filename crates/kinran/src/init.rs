@@ -418,7 +418,8 @@ fn kind(role: Role) -> Option<&'static str> {
 
 /// What is in a folder, by name, hidden files left out; paths are below the root.
 fn children(root: &Path, folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let full = root.join(folder);
+    // Without the slash that joining nothing adds.
+    let full: PathBuf = root.join(folder).components().collect();
     let io = |e| kinran_image::Error::io(&full, e);
     let mut names = Vec::new();
     for entry in std::fs::read_dir(&full).map_err(io)? {
