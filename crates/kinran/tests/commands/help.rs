@@ -66,7 +66,7 @@ fn flags_stand_under_the_heading_that_they_belong_to() {
             match line.strip_suffix(':').filter(|l| !l.starts_with(' ')) {
                 Some(name) => name.clone_into(&mut heading),
                 None => {
-                    let flag = line.trim_start().split_whitespace().find(|word| word.starts_with("--"));
+                    let flag = line.split_whitespace().find(|word| word.starts_with("--"));
                     let is_flag = line.trim_start().starts_with('-');
                     found.extend(flag.filter(|_| is_flag).map(|flag| (heading.clone(), flag.to_owned())));
                 }
