@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{bumps, files, glb, kinran, kinran_json, refused, square, text};
+use common::{bumps, files, glb, glb_with, kinran, kinran_json, refused, square, text};
 use kinran_image::{
     Channels, Format, Image, Pixels, Texture, Transfer, decode_image, encode_png, read_image, read_texture,
 };
@@ -472,7 +472,9 @@ fn flags_about_folders_are_swallowed_by_models() {
         };
         let setting = format!("{key} = {value}");
         std::fs::write(&manifest, entry(&setting, "")).unwrap();
-        refused(&["bake", text(&manifest), "--dry-run"], &[key, "glTF"]);
+        let said = kinran(&["bake", text(&manifest), "--dry-run"]);
+        assert_eq!(said.code, Some(2), "{key} of an entry: {}", said.err);
+        assert!(said.err.contains(key) && said.err.contains("glTF"), "{key} of an entry: {}", said.err);
         std::fs::write(&manifest, entry("", &setting)).unwrap();
         let said = kinran(&["bake", text(&manifest), "--dry-run"]);
         assert_eq!(said.code, Some(0), "{key} as a default: {}", said.err);
@@ -482,23 +484,22 @@ fn flags_about_folders_are_swallowed_by_models() {
 /// The commonest fault of authored glTF: green that points down.
 #[test]
 fn green_down_in_a_model_is_not_noticed_or_not_turned() {
-    let (folder, model) = square();
-    let turned = |bytes: &[u8]| {
-        let png = encode_png(&bumps()).unwrap();
-        let at = bytes.windows(png.len()).position(|part| part == png).unwrap();
-        let up = bumps();
-        let down = image(32, Channels::Rgb, |x, y| {
-            let [r, g, b, _] = up.texel(x, y).map(|v| (v * 255.0).round() as u8);
-            [r, 255 - g, b, 255]
-        });
-        let mut out = bytes.to_vec();
-        let new = encode_png(&down).unwrap();
-        assert!(new.len() <= png.len(), "the image does not fit where the other was");
-        out[at..at + new.len()].copy_from_slice(&new);
-        out
+    // Waves along the diagonal: with z = cos(x + v) the slopes along x and v are the same, and y points against v.
+    let waves = |green_up: bool| {
+        image(32, Channels::Rgb, move |x, y| {
+            let slope = 0.6 * (std::f32::consts::TAU * (x + y) as f32 / 8.0).sin();
+            let length = (2.0 * slope * slope + 1.0).sqrt();
+            let code = |n: f32| ((n / length * 0.5 + 0.5) * 255.0 + 0.5) as u8;
+            let green = code(-slope);
+            [code(slope), if green_up { green } else { 255 - green }, code(1.0), 255]
+        })
     };
-    let wrong = folder.path().join("wrong.glb");
-    std::fs::write(&wrong, turned(&std::fs::read(&model).unwrap())).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let [model, wrong] = [("right", true), ("wrong", false)].map(|(name, green_up)| {
+        let path = folder.path().join(format!("{name}.glb"));
+        std::fs::write(&path, glb_with(&waves(green_up))).unwrap();
+        path
+    });
     let bake = |model: &Path, flags: &[&str]| {
         let out = folder.path().join("out");
         let report = kinran_json(

@@ -266,7 +266,8 @@ fn a_person_can_drive_the_window() {
     let share = dragged["split_at"].as_f64().unwrap();
     assert!((share - (0.5 + 120.0 / PANEL as f64)).abs() < 0.02, "the line was dragged to {share}");
     assert_eq!(dragged["orbit"], before["orbit"], "dragging the line turned the model");
-    display.drag("1", (middle - 100, 500), (middle - 40, 470));
+    // Above the message in the lower corner, which says what was saved.
+    display.drag("1", (middle - 100, 300), (middle - 40, 270));
     let turned = window.saved(&parameters);
     for what in ["yaw", "pitch"] {
         assert_ne!(turned["orbit"][what], before["orbit"][what], "{what} did not change");
@@ -274,7 +275,7 @@ fn a_person_can_drive_the_window() {
     assert_ne!(lit, at_rest, "the split line was not seen");
 
     // Nearer, aside, and back to where it began.
-    let [x, y] = [middle - 100, 480].map(|x| x.to_string());
+    let [x, y] = [middle - 100, 280].map(|x| x.to_string());
     display.xdotool(&["mousemove", &x, &y, "sleep", "0.3", "click", "4", "sleep", "0.3"]);
     let nearer = window.saved(&parameters);
     let distance = |saved: &Value| saved["orbit"]["distance"].as_f64().unwrap();
@@ -284,7 +285,7 @@ fn a_person_can_drive_the_window() {
         distance(&turned),
         distance(&nearer)
     );
-    display.drag("3", (middle - 100, 500), (middle - 60, 480));
+    display.drag("3", (middle - 100, 300), (middle - 60, 280));
     let aside = window.saved(&parameters);
     assert_ne!(aside["orbit"]["target"], nearer["orbit"]["target"], "the right button moved nothing");
     display.keys(&["f", "c"]);

@@ -31,7 +31,8 @@ pub fn rnm_inverse(target: Vec3, detail: Vec3) -> Vec3 {
     }
 }
 
-/// Directions to start from: with them the best is within 22.5° of one, and the cosine below has two peaks at most.
+/// Directions to start from: the cosine below has two peaks at most, which may be as high as each other, and each is
+/// within 22.5° of one.
 const COMPASS: [[f32; 2]; 8] = {
     const R: f32 = core::f32::consts::FRAC_1_SQRT_2;
     [[1.0, 0.0], [R, R], [0.0, 1.0], [-R, R], [-1.0, 0.0], [-R, -R], [0.0, -1.0], [R, -R]]
@@ -45,21 +46,21 @@ fn rnm_inverse_on_horizon(t: Vec3, d: Vec3) -> Vec3 {
     let (first, second) = (t.x * d.z - t.z * d.x, t.y * d.z - t.z * d.y);
     // But for a constant.
     let cosine = |[c, s]: [f32; 2]| s * s * along - c * s * across + c * first + s * second;
-    let mut best = COMPASS[0];
-    for &start in &COMPASS[1..] {
-        if cosine(start) > cosine(best) {
-            best = start;
+    let peak = |start: [f32; 2]| {
+        let mut at = start;
+        for _ in 0..5 {
+            let [c, s] = at;
+            let slope = 2.0 * c * s * along - (c * c - s * s) * across - s * first + c * second;
+            let bend = 2.0 * (c * c - s * s) * along + 4.0 * c * s * across - c * first - s * second;
+            // Towards the peak, also where the curve bends the other way, and no farther than to the next start.
+            let turn = (slope / bend.abs().max(1e-6)).clamp(-0.4, 0.4);
+            let (x, y) = (c - s * turn, s + c * turn);
+            let scale = sqrt(x * x + y * y).recip();
+            at = [x * scale, y * scale];
         }
-    }
-    for _ in 0..5 {
-        let [c, s] = best;
-        let slope = 2.0 * c * s * along - (c * c - s * s) * across - s * first + c * second;
-        let bend = 2.0 * (c * c - s * s) * along + 4.0 * c * s * across - c * first - s * second;
-        // Towards the peak, also where the curve bends the other way, and no farther than to the next start.
-        let turn = (slope / bend.abs().max(1e-6)).clamp(-0.4, 0.4);
-        let (x, y) = (c - s * turn, s + c * turn);
-        let scale = sqrt(x * x + y * y).recip();
-        best = [x * scale, y * scale];
-    }
-    vec3(best[0], best[1], 0.0)
+        at
+    };
+    let higher = |a: [f32; 2], b: [f32; 2]| if cosine(b) > cosine(a) { b } else { a };
+    let [x, y] = COMPASS.map(peak).into_iter().reduce(higher).unwrap_or(COMPASS[0]);
+    vec3(x, y, 0.0)
 }

@@ -69,6 +69,11 @@ pub(crate) fn bumps() -> Image {
 
 /// The bytes of a .glb: a square of side 2 in the plane z = 0 that faces +z, metallic, with a normal map.
 pub(crate) fn glb() -> Vec<u8> {
+    glb_with(&bumps())
+}
+
+/// The same with another normal map.
+pub(crate) fn glb_with(map: &Image) -> Vec<u8> {
     let corners = [[-1.0_f32, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let positions = corners.iter().flat_map(|[x, y]| [*x, *y, 0.0]);
     let normals = corners.iter().flat_map(|_| [0.0, 0.0, 1.0]);
@@ -76,7 +81,7 @@ pub(crate) fn glb() -> Vec<u8> {
     let floats = positions.chain(normals).chain(uvs);
     let mut bin: Vec<u8> = floats.flat_map(f32::to_le_bytes).collect();
     bin.extend([0_u16, 1, 2, 0, 2, 3].into_iter().flat_map(u16::to_le_bytes));
-    let png = encode_png(&bumps()).expect("the image is sound");
+    let png = encode_png(map).expect("the image is sound");
     let (image_start, image_length) = (bin.len(), png.len());
     bin.extend(png);
     while !bin.len().is_multiple_of(4) {
