@@ -348,8 +348,12 @@ fn everything_out_of_the_ordinary_is_counted() {
     shape.positions.extend([Vec3::new(0.0, 0.0, 5.0), Vec3::new(9.0, 9.0, 9.0)]);
     shape.normals.extend([Vec3::X, Vec3::Z]);
     shape.triangles.extend([[0, 1, 1], [5, 5, 5], [40, 41, first]]);
-    for method in [Method::Normals, Method::Fit] {
-        let baked = bake(&shape, true, &Options { blur: vec![0.1], ..raw(method) });
+    // Blurred or not: a count that was not made would read as none.
+    let blurs = [vec![0.1], Vec::new()];
+    for (method, blur) in
+        [Method::Normals, Method::Fit].into_iter().flat_map(|m| blurs.clone().map(|b| (m, b)))
+    {
+        let baked = bake(&shape, true, &Options { blur, ..raw(method) });
         let report = baked.report;
         assert_eq!(report.degenerate_triangles, 2, "{report:?}");
         assert_eq!(report.unreferenced_vertices, 1, "{report:?}");

@@ -182,7 +182,7 @@ impl Survey {
         for (parent, folders) in by_parent(&self.folders) {
             entry(&mut text, "aniso", &self.patterns(&parent, &folders, None)?, output("maps", &parent), "");
         }
-        for extension in ["glb", "gltf"] {
+        for extension in ["glb", "vrm", "gltf"] {
             let models = self.models.iter().filter(|path| has_extension(path, extension));
             for (parent, models) in by_parent(models) {
                 let patterns = self.patterns(&parent, &models, Some(extension))?;
@@ -293,7 +293,7 @@ impl Found {
         let (folders, files): (Vec<PathBuf>, Vec<PathBuf>) =
             children.into_iter().partition(|path| root.join(path).is_dir());
         for path in files {
-            if has_extension(&path, "glb") || has_extension(&path, "gltf") {
+            if kinran_scene::is_gltf(&path) {
                 self.models.push(path);
             } else if has_extension(&path, "obj") {
                 let way = "save it as .glb (Blender does) to bake it; `kinran render` and `kinran skin` take it as it is";

@@ -189,6 +189,7 @@ pub fn bake_curvature(mesh: &Mesh<'_>, options: &Options) -> Result<Curvature, C
         hard_points,
         ..Report::default()
     };
+    (report.border_edges, report.non_manifold_edges) = edges(&surface, &fans);
     if options.method == Method::Fit || !options.blur.is_empty() {
         if options.method == Method::Fit {
             report.unfitted_points = quadric::quadric_tensors(&surface, &fans, &normals, &mut tensors);
@@ -198,7 +199,6 @@ pub fn bake_curvature(mesh: &Mesh<'_>, options: &Options) -> Result<Curvature, C
         }
         let deviations: Vec<f64> = options.blur.iter().map(|mm| mm / options.millimetres).collect();
         blur::blur(&surface, &fans, &normals, &mut tensors, &deviations);
-        (report.border_edges, report.non_manifold_edges) = edges(&surface, &fans);
     } else if options.clamp {
         tensors.iter_mut().for_each(|t| *t = clamp_concave(*t));
     }

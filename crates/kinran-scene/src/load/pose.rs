@@ -126,6 +126,11 @@ impl Loader<'_> {
             mirrored += determinant.signum();
             let position = matrix.transform_point3(primitive.positions[i].as_dvec3());
             posed.positions[i] = (position - origin.as_dvec3()).as_vec3();
+            // What is only moved and scaled keeps its directions bit by bit.
+            let scale = linear.x_axis.x;
+            if scale > 0.0 && linear == DMat3::from_diagonal(DVec3::splat(scale)) {
+                continue;
+            }
             let normal = normal_matrix(linear) * primitive.normals[i].as_dvec3();
             posed.normals[i] = normal.try_normalize().map_or(primitive.normals[i], DVec3::as_vec3);
             let tangent = primitive.tangents[i];
