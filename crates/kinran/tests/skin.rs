@@ -376,14 +376,7 @@ fn skinned_and_morphed_meshes_are_baked_in_their_rest_pose_and_stay_so() {
         let baked = bake(model, &folder.path().join("out"), "1000", &[]);
         Scene::load(&baked).unwrap()
     });
-    let [plain, moved] = [&plain, &posed].map(|scene| scene.primitives[0].curvature.as_ref().unwrap());
-    let (near, moved_range) = ((plain.range - moved.range).abs() < 1e-3 * plain.range, moved.range);
-    assert!(near && plain.codes.len() == moved.codes.len(), "wanted {}, got {moved_range}", plain.range);
-    // Three metres away positions are rounded 50 times as coarsely: by two steps of a code at most.
-    for (i, (wanted, got)) in plain.codes.iter().zip(&moved.codes).enumerate() {
-        let apart = (*wanted - *got).abs().max_element();
-        assert!(apart < 2.5 / 255.0, "vertex {i}: wanted {wanted}, got {got}");
-    }
+    assert_eq!(plain.primitives[0].curvature, posed.primitives[0].curvature);
     assert!(posed.warnings.iter().any(|w| w.contains("rest pose")), "{:?}", posed.warnings);
     // The morph target and the weights are still there, for as many vertices as there are now.
     let bytes = std::fs::read(folder.path().join("out/posed.glb")).unwrap();
