@@ -15,8 +15,8 @@ use crate::{Console, Error, Progress};
 
 /// Writes a kinran.toml that lists what a folder holds, for `kinran bake kinran.toml`
 ///
-/// Folders of maps become [[aniso]] entries, .glb and .gltf files [[mesh]] entries, and images in a folder called targets
-/// [[detail]] entries, where a folder called tiles stands beside it and a target's name tells its tile. What was baked
+/// Folders of maps become `[[aniso]]` entries, .glb and .gltf files `[[mesh]]` entries, and images in a folder called targets
+/// `[[detail]]` entries, where a folder called tiles stands beside it and a target's name tells its tile. What was baked
 /// before, maps of the models and hidden folders are left out; what cannot be baked as it is stands in the file as a
 /// comment that says why. A kinran.toml that is there already stays as it is.
 #[derive(Debug, clap::Args)]
