@@ -86,7 +86,7 @@ const QUICK: Scale = Scale {
     distances: &[1.0, 2.0],
 };
 
-/// Parts of the time that the three steps of a material take, as measured, for the estimate.
+/// Parts of the time that the three steps of a material take, for the estimate; chosen by eye.
 const MAKING: u64 = 1;
 const DRAWING: u64 = 2;
 const COMPARING: u64 = 4;
