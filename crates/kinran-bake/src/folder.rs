@@ -1,40 +1,50 @@
 //! A folder of authored maps, understood by the names that exporters give them.
 //!
 //! A name is taken apart at `_`, `-`, `.`, blanks and inner capitals, upper and lower case alike. Words
-//! that only say how the file was saved (`2K`, `1024`, `PNG`, `LOD0`, `16bit`, `map`) are left out, the words
-//! before them are the map's role, and what stands before the role is the material's name. A file called
-//! after its role alone belongs to the folder's material.
+//! that only say how the file was saved (`2K`, `1024`, `PNG`, `LOD0`, `16bit`, `map`; behind a role also `final`, `copy`,
+//! `v002`, ` (1)`, `Utility - Raw`) are left out, the words before them are the map's role, and what stands before the
+//! role is the material's name. A file called after its role alone belongs to the folder's material.
 //!
 //! | names, without separators | role | channels | written so by |
 //! |---|---|---|---|
-//! | `normal` `normals` `norm` `nor` `nrm` `normalmap` | `normal`, +Y assumed | RG | glTF, Megascans, 3dtextures.me |
+//! | `normal` `normals` `norm` `nor` `nrm` `normalmap` `nmap` `nml` | `normal`, +Y assumed | RG | glTF, Megascans, 3dtextures.me, 3D-Coat |
 //! | … + `gl` `ogl` `opengl` | `normal`, +Y | RG | ambientCG, Poly Haven, Substance |
 //! | … + `dx` `directx` `d3d` | `normal`, −Y | RG | ambientCG, Poly Haven, Substance |
 //! | `roughness` `rough` `rgh` | `roughness` | R | all |
-//! | `gloss` `glossiness` `glossy` `smoothness` | `gloss` | R, one minus roughness | Megascans, Substance |
+//! | `gloss` `glossiness` `glossy` `smoothness` | `gloss` | R, one minus roughness | Megascans, Substance, Poliigon |
 //! | `glossu`, `glossv` (`glossinessu`, …) | `gloss-u`, `gloss-v` | R, along and across the direction | the talk |
 //! | `direction` `flow` `flowmap` `anisodirection` `anisotropydirection` | `direction` | RG a vector; grey an angle, whose span is asked for | Godot, the talk |
 //! | `anisotropyangle` `anisoangle` | `direction-angle` | R, 0 to 1 is a full turn | Substance |
 //! | `anisotropylevel` `anisolevel` | `anisotropy-level` | R, Adobe Standard Material: `alpha_t = min(1, alpha + level⁴)` | Substance |
 //! | `anisotropy` | `anisotropy` | RG direction, B strength | glTF (`KHR_materials_anisotropy`) |
 //! | `aniso` | `aniso` | RGB, an aniso texel | Kinran |
-//! | `albedo` `basecolor` `diffuse` `diff` `color` `col`, `…colour` | `color` | RGB, sRGB | all |
+//! | `albedo` `basecolor` `diffuse` `diff` `color` `col`, `…colour`; `basemap` `maintex` `albedotransparency` | `color` | RGB, sRGB | all; Unity |
 //! | `ao` `occ` `occlusion` `ambientocclusion` `mixedao` | `occlusion` | R | all |
 //! | `metallic` `metalness` `metal` | `metallic` | R | all |
-//! | `orm` `arm` `occlusionroughnessmetallic` | `orm` | R occlusion, G roughness, B metallic | Unreal, Poly Haven, glTF, Substance |
-//! | `rma`, `mra` | `rma`, `mra` | in the order of the letters | Unreal |
-//! | `metallicroughness` | `metallic-roughness` | G roughness, B metallic | glTF |
-//! | `metallicsmoothness` | `metallic-smoothness` | R metallic, A gloss | Unity |
+//! | `orm` `arm` `aorm` `occlusionroughnessmetallic` | `orm` | R occlusion, G roughness, B metallic | Unreal, Poly Haven, glTF, Substance |
+//! | `rma` `rmo` `rmao`, `mra` `mro` `mrao` | `rma`, `mra` | in the order of the letters | Unreal |
+//! | `ord` `ordp` `orh` `occlusionroughness`; `roughao`, which is told | `occlusion-roughness` | R occlusion, G roughness | Quixel; Poly Haven |
+//! | `metallicroughness`; `x_metallic-x_roughness` | `metallic-roughness` | G roughness, B metallic | glTF; Blender's exporter |
+//! | `metallicsmoothness` `metallicgloss` | `metallic-smoothness` | R metallic, A gloss | Unity |
+//! | `specularsmoothness` `specularglossiness` | `specular-smoothness` | A gloss | Unity, glTF |
 //! | `maskmap` | `mask-map` | R metallic, G occlusion, A gloss | Unity HDRP |
-//! | `n`, `r`, `d` `bc`, `m` | `normal`, `roughness`, `color`, `metallic` | as above; with Unreal's `T_` before, or beside another map of the same material | Unreal |
-//! | `height` `disp` `displacement` `bump`, `emissive`, `specular` `spec`, `opacity` `mask` | the same | not used | all |
+//! | `n` `nm`, `r`, `d` `bc` (`a`, `b` behind `T_`), `m`, `o` | `normal`, `roughness`, `color`, `metallic`, `occlusion` | as above; with Unreal's `T_` before, or beside another map of the same material | Unreal, Fab |
+//! | `height` `disp` `displacement` `bump`, `emissive`, `specular` `spec` `refl`, `opacity` `mask` | the same | not used | all |
+//! | `curvature` `thickness` `position` `id` `cavity` `worldspacenormals` `bentnormals` `normalsobject` and the like | `other` | not used | bakers, Megascans |
+//!
+//! Names are read together: a word that every file of a set has behind its role, such as Poliigon's `METALNESS`, is no
+//! role; words behind a role that two files of different roles share name a variant of the material; the number of a UDIM
+//! tile (`Head_Normal.1001`) makes a material of each tile. Two files for one map are compared when they are read, and
+//! normal maps with green up and down told apart by their slopes ([`Twin`]).
 //!
 //! Nothing is guessed in silence. What can be read in two ways is a [`FolderError`] that names the files and
-//! the flag that settles it; what is assumed stands in the table ([`Folder::table`]).
+//! the flag that settles it; what is assumed stands in the table ([`Folder::table`]), and every file has a row there.
 
 mod evidence;
 mod load;
 mod names;
+mod sets;
+mod twins;
 
 use std::collections::BTreeMap;
 use std::f32::consts::TAU;
@@ -51,9 +61,19 @@ use crate::aniso::NormalZ;
 pub use evidence::{GREEN_CONFIDENCE, GreenGuess, green_correlation, guess_green, odd_lengths};
 pub use load::{LoadedMap, LoadedMaterial};
 pub use names::{Green, Role};
+pub use twins::Twin;
 
 /// Extensions of files that are read.
 pub(crate) const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "tga", "tif", "tiff", "exr", "hdr"];
+
+/// Extensions of other pictures; what is in both lists is read.
+const PICTURES: [&str; 29] = [
+    "avif", "basis", "bmp", "dds", "dpx", "gif", "heic", "heif", "iff", "j2k", "jfif", "jp2", "jpe", "jxl",
+    "kra", "ktx", "ktx2", "ora", "pbm", "pgm", "pic", "ppm", "psb", "psd", "sgi", "svg", "tx", "webp", "xcf",
+];
+
+/// A folder of maps in an archive beside other files.
+const INNER: [&str; 3] = ["textures", "texture", "maps"];
 
 /// Roughness of a surface for which nothing gives any: the middle of the range, chosen by eye.
 pub const ASSUMED_ROUGHNESS: f32 = 0.5;
@@ -178,10 +198,20 @@ pub struct Row {
     pub note: String,
 }
 
+impl Row {
+    /// Whether the file is a picture, or the row is about what no file gives.
+    pub fn is_picture(&self) -> bool {
+        self.note != NO_PICTURE
+    }
+}
+
+/// The note of files that are none.
+const NO_PICTURE: &str = "no picture, not used";
+
 /// A folder understood. Serializes as its rows, without paths.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Folder {
-    /// Every image file, material by material.
+    /// Every file, material by material, and what is assumed where there is none.
     pub rows: Vec<Row>,
     /// The materials, by name.
     #[serde(skip)]
@@ -204,6 +234,8 @@ pub enum GreenSource {
     Name,
     /// A flag says it.
     Flag,
+    /// The slopes of a pair of maps, of which one has it the other way round, say it.
+    Texels,
     /// Nothing does; +Y as in glTF.
     Assumed,
 }
@@ -307,6 +339,8 @@ pub struct MaterialMaps {
     pub files: Vec<(Role, PathBuf)>,
     /// What lies beyond the borders.
     pub wrap: [Wrap; 2],
+    /// Files that should say what one of `files` says, which is used if they do.
+    pub twins: Vec<Twin>,
     /// What was assumed that matters and that a flag settles, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -342,9 +376,14 @@ impl Folder {
 /// A file on its way to being understood.
 struct Found {
     path: PathBuf,
+    /// Its name in the folder.
     file: String,
     name: names::Name,
+    /// What its name may mean too.
+    readings: Vec<names::Name>,
     role: Option<Role>,
+    /// A picture in a format that is not read.
+    unread: bool,
     /// A flag gave the role.
     forced: bool,
     /// Why the file is not used, if it is not.
@@ -358,15 +397,15 @@ impl Found {
     }
 }
 
-/// Finds the materials in a folder by the names of its image files. Does not look into folders in it, nor at
-/// hidden files; no image is read yet.
+/// Finds the materials in a folder by the names of its image files, or where it has none in a folder called textures in it.
+/// Does not look into other folders, nor at hidden files; no image is read yet.
 ///
 /// # Errors
 /// [`FolderError`]: the folder cannot be read or has no maps, a flag makes no sense, or maps can be read in
 /// more than one way.
 pub fn scan(folder: &Path, hints: &Hints) -> Result<Folder, FolderError> {
     check_flags(hints)?;
-    let (mut found, others) = list(folder)?;
+    let Listing { mut found, others, folders } = list(folder)?;
     apply_flags(folder, hints, &mut found)?;
     judge_letters(&mut found);
 
@@ -384,28 +423,63 @@ pub fn scan(folder: &Path, hints: &Hints) -> Result<Folder, FolderError> {
         };
         let mut material = understand(&name, &mut files, hints)?;
         let constants = material.as_ref().map(|material| constant_rows(material, hints)).unwrap_or_default();
-        if let Some(material) = material.as_mut().filter(|m| lacks_roughness(m) && hints.roughness.is_none())
-        {
-            let seen: Vec<String> = strangers.iter().map(|file| file.file.clone()).collect();
-            let seen =
-                if seen.is_empty() { seen.concat() } else { format!("; not recognised: {}", listed(&seen)) };
-            material.warnings.push(format!(
-                "{name}: no roughness map, {ASSUMED_ROUGHNESS} is assumed; say --roughness VALUE, or name the map with \
-                 --map roughness=FILE{seen}"
-            ));
+        if let Some(material) = material.as_mut() {
+            material.warnings = assumptions(material, &files, hints, &strangers);
         }
         result.rows.extend(files.into_iter().map(|file| row_of(&name, file)));
         result.rows.extend(constants);
         result.materials.extend(material);
     }
     result.rows.extend(strangers.into_iter().map(|file| row_of("", file)));
+    let no_picture = |file| Row {
+        material: String::new(),
+        file,
+        role: None,
+        channels: "-".into(),
+        note: NO_PICTURE.into(),
+    };
+    result.rows.extend(others.into_iter().map(no_picture));
 
     if result.materials.is_empty() {
-        let mut seen: Vec<String> = result.rows.into_iter().map(|row| row.file).chain(others).collect();
+        let mut seen: Vec<String> = result.rows.into_iter().map(|row| row.file).chain(folders).collect();
         seen.sort();
         return Err(FolderError::NoMaps { folder: folder.into(), seen });
     }
     Ok(result)
+}
+
+/// What is assumed of a material that matters and that a flag settles, a sentence each.
+fn assumptions(material: &MaterialMaps, files: &[Found], hints: &Hints, strangers: &[Found]) -> Vec<String> {
+    let name = &material.name;
+    let seen: Vec<String> = strangers.iter().map(|file| file.file.clone()).collect();
+    let seen = if seen.is_empty() { String::new() } else { format!("; not recognised: {}", listed(&seen)) };
+    let mut warnings = Vec::new();
+    if is_flat(material) {
+        warnings.push(format!(
+            "{name}: no normal map, the surface is taken to be flat; name the map with --map normal=FILE if there is \
+             one{seen}"
+        ));
+    }
+    if lacks_roughness(material) && hints.roughness.is_none() {
+        warnings.push(format!(
+            "{name}: no roughness map, {ASSUMED_ROUGHNESS} is assumed; say --roughness VALUE, or name the map with \
+             --map roughness=FILE{seen}"
+        ));
+    }
+    let unclear = files.iter().find(|file| file.is(Role::OcclusionRoughness) && file.name.unclear);
+    warnings.extend(unclear.map(|file| {
+        format!(
+            "{0}: taken to hold occlusion in red and roughness in green, as glTF packs them; say --map roughness={0} if \
+             roughness is in red",
+            file.file
+        )
+    }));
+    warnings
+}
+
+/// Whether a material has a surface, and no normal map on it.
+fn is_flat(material: &MaterialMaps) -> bool {
+    material.roughness.is_some() && material.normal.is_none()
 }
 
 fn check_flags(hints: &Hints) -> Result<(), FolderError> {
@@ -421,8 +495,53 @@ fn check_flags(hints: &Hints) -> Result<(), FolderError> {
     Ok(())
 }
 
-/// The image files by name, and the names of everything else that a person sees there.
-fn list(folder: &Path) -> Result<(Vec<Found>, Vec<String>), FolderError> {
+/// What a person sees in a folder.
+struct Listing {
+    /// Pictures, by name.
+    found: Vec<Found>,
+    /// Names of other files.
+    others: Vec<String>,
+    /// Names of folders.
+    folders: Vec<String>,
+}
+
+impl Listing {
+    fn has_maps(&self) -> bool {
+        self.found.iter().any(|file| file.role.is_some() && !file.unread)
+    }
+}
+
+/// What is in a folder, and in the [`inner_folder`] where there is one.
+fn list(folder: &Path) -> Result<Listing, FolderError> {
+    let mut listing = list_one(folder, "")?;
+    if let Some(inner) = inner_folder_of(folder, &listing) {
+        let more = list_one(&inner, &format!("{}/", file_name(&inner)))?;
+        listing.found.extend(more.found);
+        listing.others.extend(more.others);
+    }
+    Ok(listing)
+}
+
+/// The folder in a folder that has its maps, as archives do: the only one called textures or maps, where the folder itself
+/// has neither maps nor a glTF file.
+pub fn inner_folder(folder: &Path) -> Option<PathBuf> {
+    inner_folder_of(folder, &list_one(folder, "").ok()?)
+}
+
+fn inner_folder_of(folder: &Path, listing: &Listing) -> Option<PathBuf> {
+    let is_model = |file: &String| kinran_scene::is_gltf(Path::new(file));
+    if listing.has_maps() || listing.others.iter().any(is_model) {
+        return None;
+    }
+    let is_inner = |name: &&String| INNER.iter().any(|inner| name.eq_ignore_ascii_case(inner));
+    let mut inner = listing.folders.iter().filter(is_inner);
+    let (Some(name), None) = (inner.next(), inner.next()) else { return None };
+    let inner = folder.join(name);
+    list_one(&inner, "").is_ok_and(|listing| listing.has_maps()).then_some(inner)
+}
+
+/// What is in one folder; files are called by their names behind `prefix`.
+fn list_one(folder: &Path, prefix: &str) -> Result<Listing, FolderError> {
     let io = |e| FolderError::Image(kinran_image::Error::io(folder, e));
     let entries = match fs::read_dir(folder) {
         Err(e) if e.kind() == ErrorKind::NotADirectory => {
@@ -430,21 +549,26 @@ fn list(folder: &Path) -> Result<(Vec<Found>, Vec<String>), FolderError> {
         }
         other => other.map_err(io)?,
     };
-    let (mut found, mut others) = (Vec::new(), Vec::new());
+    let mut listing = Listing { found: Vec::new(), others: Vec::new(), folders: Vec::new() };
     for entry in entries {
         let path = entry.map_err(io)?.path();
         let file = file_name(&path);
         if file.starts_with('.') {
             continue;
         }
-        if is_image(&path) && !path.is_dir() {
-            found.push(found_file(path));
+        if path.is_dir() {
+            listing.folders.push(file);
+        } else if is_one_of(&path, &EXTENSIONS) || is_one_of(&path, &PICTURES) {
+            listing.found.push(Found { file: format!("{prefix}{file}"), ..found_file(path) });
         } else {
-            others.push(file);
+            listing.others.push(format!("{prefix}{file}"));
         }
     }
-    found.sort_by(|a, b| a.path.cmp(&b.path));
-    Ok((found, others))
+    listing.found.sort_by(|a, b| a.path.cmp(&b.path));
+    listing.others.sort();
+    listing.folders.sort();
+    sets::settle(&mut listing.found);
+    Ok(listing)
 }
 
 /// The image files of a folder that a name tells the role of, by name, with the way green points where the name says
@@ -453,21 +577,24 @@ fn list(folder: &Path) -> Result<(Vec<Found>, Vec<String>), FolderError> {
 /// # Errors
 /// [`FolderError::NotAFolder`], or the folder cannot be read.
 pub fn named_maps(folder: &Path) -> Result<Vec<(PathBuf, Role, Option<Green>)>, FolderError> {
-    let (found, _) = list(folder)?;
-    Ok(found.into_iter().filter_map(|file| Some((file.path, file.role?, file.name.green))).collect())
+    let found = list(folder)?.found.into_iter().filter(|file| !file.unread);
+    Ok(found.filter_map(|file| Some((file.path, file.role?, file.name.green))).collect())
 }
 
-fn is_image(path: &Path) -> bool {
-    path.extension().is_some_and(|e| EXTENSIONS.iter().any(|known| e.eq_ignore_ascii_case(known)))
+fn is_one_of(path: &Path, extensions: &[&str]) -> bool {
+    path.extension().is_some_and(|e| extensions.iter().any(|known| e.eq_ignore_ascii_case(known)))
 }
 
 fn found_file(path: PathBuf) -> Found {
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let name = names::parse(&stem);
+    let readings = names::readings(&stem);
+    let name = readings[0].clone();
     Found {
         file: file_name(&path),
         role: name.role,
         name,
+        readings,
+        unread: !is_one_of(&path, &EXTENSIONS),
         path,
         forced: false,
         dropped: None,
@@ -616,6 +743,10 @@ fn constant_rows(material: &MaterialMaps, hints: &Hints) -> Vec<Row> {
         note,
     };
     let mut rows = Vec::new();
+    if is_flat(material) {
+        let note = "warning: no map, the surface is flat; --map normal=FILE names one";
+        rows.push(row(Role::Normal, note.into()));
+    }
     if lacks_roughness(material) {
         rows.push(row(
             Role::Roughness,
@@ -654,14 +785,14 @@ fn understand(
     use Role::*;
 
     // Which of the ways to say the same is meant.
-    settle_normals(material, files, hints)?;
-    let groups: [(&str, &[&[Role]]); 5] = [
+    settle_unread(material, files)?;
+    let mut twins = Vec::new();
+    let groups: [(&str, &[&[Role]]); 4] = [
         (
             "several maps say how the highlight is stretched",
             &[&[Aniso], &[GlossU, GlossV], &[Anisotropy], &[AnisotropyLevel]],
         ),
         ("roughness is given twice", &[&[Aniso, GlossU, GlossV], &[Roughness, Gloss]]),
-        ("there are both roughness and gloss", &[&[Roughness], &[Gloss]]),
         ("there are two direction maps", &[&[Direction], &[DirectionAngle]]),
         ("the direction is given twice", &[&[Aniso, Anisotropy], &[Direction, DirectionAngle]]),
     ];
@@ -669,6 +800,7 @@ fn understand(
         settle(material, files, question, alternatives)?;
     }
     for role in [
+        Normal,
         Roughness,
         Gloss,
         GlossU,
@@ -682,9 +814,11 @@ fn understand(
         Occlusion,
         Metallic,
     ] {
-        settle_twins(material, files, |r| r == role, &format!("there are several {role} maps"))?;
+        let question = format!("there are several {role} maps");
+        twins.extend(settle_twins(material, files, |r| r == role, &question, hints)?);
     }
-    settle_twins(material, files, Role::is_packed, "there are several packed maps")?;
+    twins.extend(settle_twins(material, files, Role::is_packed, "there are several packed maps", hints)?);
+    twins.extend(settle_gloss(material, files, hints)?);
 
     let at = |files: &[Found], role: Role| files.iter().position(|f| f.is(role));
     let path = |files: &[Found], role: Role| at(files, role).map(|i| files[i].path.clone());
@@ -745,7 +879,7 @@ fn understand(
             }
             GreenSource::Flag => format!("{sign} by flag"),
             GreenSource::Name => format!("{sign} by name"),
-            GreenSource::Assumed => format!("assumed {sign}"),
+            GreenSource::Assumed | GreenSource::Texels => format!("assumed {sign}"),
         };
         add_note(&mut files[i].note, &how);
         let z = if hints.normal_blue { NormalZ::Blue } else { NormalZ::Rebuilt };
@@ -862,6 +996,7 @@ fn understand(
         metallic,
         files: used,
         wrap: hints.wrap,
+        twins,
         warnings: Vec::new(),
     }))
 }
@@ -873,45 +1008,99 @@ fn add_note(note: &mut String, more: &str) {
     note.push_str(more);
 }
 
-/// Of several normal maps keeps the forced one, or of a pair that is told apart by its green the one asked
-/// for: +Y if nothing is said.
-fn settle_normals(material: &str, files: &mut [Found], hints: &Hints) -> Result<(), FolderError> {
-    let at: Vec<usize> = (0..files.len()).filter(|&i| files[i].is(Role::Normal)).collect();
-    if let [a, b] = at[..]
-        && let (Some(green_a), Some(green_b)) = (files[a].name.green, files[b].name.green)
-        && green_a != green_b
-        && !files[a].forced
-        && !files[b].forced
-    {
-        let wanted = hints.green.unwrap_or(Green::Up);
-        let (keep, drop) = if green_a == wanted { (a, b) } else { (b, a) };
-        files[drop].dropped = Some(format!("the same normals as {}", files[keep].file));
-        return Ok(());
+/// Leaves out pictures that are not read where another file is the same map; what a material would be baked without is an
+/// error.
+fn settle_unread(material: &str, files: &mut [Found]) -> Result<(), FolderError> {
+    let is_map = |file: &Found| file.dropped.is_none() && file.role.is_some_and(Role::is_used);
+    let readable = files.iter().any(|file| !file.unread && is_map(file));
+    for i in (0..files.len()).filter(|&i| files[i].unread && is_map(&files[i])).collect::<Vec<_>>() {
+        let same = |file: &&Found| !file.unread && is_map(file) && file.role == files[i].role;
+        let extension = files[i].path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        files[i].dropped = Some(match (files.iter().find(same), files[i].role) {
+            (Some(other), _) => format!(".{extension} is not read, {} is", other.file),
+            (None, Some(role)) if readable || files[i].forced => {
+                return Err(FolderError::Unfit {
+                    path: files[i].path.clone(),
+                    reason: format!(
+                        "it is the {role} map of {material} by its name, and .{extension} files are not read"
+                    ),
+                    fix: format!("save it as PNG or EXR, or leave it out with --ignore {}", files[i].file),
+                });
+            }
+            _ => format!(".{extension} is not read; save it as PNG or EXR"),
+        });
     }
-    settle_twins(material, files, |role| role == Role::Normal, "there are several normal maps")
+    Ok(())
 }
 
-/// Of several files of a kind keeps the one forced; an error if that is not exactly one.
+/// Of several files of a kind keeps the one forced; where none is and they have one role, the likeliest, whose twins the
+/// others are.
 fn settle_twins(
     material: &str,
     files: &mut [Found],
     kind: impl Fn(Role) -> bool,
     question: &str,
-) -> Result<(), FolderError> {
+    hints: &Hints,
+) -> Result<Vec<Twin>, FolderError> {
     let at: Vec<usize> = (0..files.len())
         .filter(|&i| files[i].dropped.is_none() && files[i].role.is_some_and(&kind))
         .collect();
     if at.len() < 2 {
-        return Ok(());
+        return Ok(Vec::new());
     }
     let forced: Vec<usize> = at.iter().copied().filter(|&i| files[i].forced).collect();
-    let [keep] = forced[..] else {
+    if let [keep] = forced[..] {
+        for i in at.into_iter().filter(|&i| i != keep) {
+            files[i].dropped = Some(format!("--map names {}", files[keep].file));
+        }
+        return Ok(Vec::new());
+    }
+    let role = files[at[0]].role.filter(|role| at.iter().all(|&i| files[i].role == Some(*role)));
+    let (Some(role), true) = (role, forced.is_empty()) else {
         return Err(ambiguous(material, files, question, &at));
     };
-    for i in at.into_iter().filter(|&i| i != keep) {
-        files[i].dropped = Some(format!("--map names {}", files[keep].file));
+    // The one that points as asked for, one that says how it points, the one of 16 bits, the first.
+    let wanted = hints.green.unwrap_or(Green::Up);
+    let rank = |&i: &usize| {
+        let name = &files[i].name;
+        (name.green != Some(wanted), name.green.is_none(), !name.deep, i)
+    };
+    let keep = at.iter().copied().min_by_key(rank).unwrap_or(at[0]);
+    let pair = |i: usize| files[i].name.green.is_some() && files[i].name.green != files[keep].name.green;
+    let whys: Vec<(usize, String)> = (at.into_iter().filter(|&i| i != keep))
+        .map(|i| {
+            let kept = &files[keep].file;
+            (i, if pair(i) { format!("the same normals as {kept}") } else { format!("the same as {kept}") })
+        })
+        .collect();
+    Ok(whys.into_iter().map(|(i, why)| twin(files, (role, keep), (role, i), why, false)).collect())
+}
+
+/// Of roughness and gloss keeps the one forced, or roughness, whose twin gloss is.
+fn settle_gloss(material: &str, files: &mut [Found], hints: &Hints) -> Result<Option<Twin>, FolderError> {
+    let at = |role| files.iter().position(|file| file.is(role));
+    let (Some(rough), Some(gloss)) = (at(Role::Roughness), at(Role::Gloss)) else { return Ok(None) };
+    if files[rough].forced || files[gloss].forced {
+        let groups: &[&[Role]] = &[&[Role::Roughness], &[Role::Gloss]];
+        settle(material, files, "there are both roughness and gloss", groups)?;
+        return Ok(None);
     }
-    Ok(())
+    let opposite = !hints.roughness_is_gloss;
+    let why = format!("{} {}", if opposite { "one minus" } else { "the same as" }, files[rough].file);
+    Ok(Some(twin(files, (Role::Roughness, rough), (Role::Gloss, gloss), why, opposite)))
+}
+
+/// Drops a file as the twin of another.
+fn twin(
+    files: &mut [Found],
+    (role, keep): (Role, usize),
+    (other_role, other): (Role, usize),
+    why: String,
+    is_opposite: bool,
+) -> Twin {
+    files[other].dropped = Some(why);
+    let path = |i: usize| files[i].path.clone();
+    Twin { role, used: path(keep), other_role, other: path(other), is_opposite }
 }
 
 /// Of groups of roles that exclude each other keeps the one with a forced file; an error if several are

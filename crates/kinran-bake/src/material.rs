@@ -20,13 +20,14 @@ pub struct MaterialSurface {
 /// Why a material has no surface to filter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NoSurface {
-    /// It has no normal map and is isotropic: the mesh's normals, and a roughness that is the same in all directions.
+    /// It has neither a normal nor a roughness map and is isotropic: the mesh's normals, and one roughness everywhere.
     Plain,
     /// Its maps lie on the mesh in different ways and cannot become one texture; the sentence says which.
     Apart(String),
 }
 
-/// The surface of material number `material`, when it has a normal map or is anisotropic, by a map or by factors.
+/// The surface of material number `material`, when it has a normal or a roughness map or is anisotropic, by a map or by
+/// factors.
 ///
 /// # Errors
 /// [`NoSurface`] otherwise, and where the maps do not share UV set, transform and wrapping.
@@ -37,10 +38,11 @@ pub fn material_surface(scene: &Scene, material: usize) -> Result<MaterialSurfac
     let m = &scene.materials[material];
     let anisotropy = m.anisotropy.as_ref().filter(|a| a.strength > 0.0);
     let anisotropy_texture = anisotropy.and_then(|a| a.texture.as_ref());
-    if m.normal.is_none() && anisotropy.is_none() {
+    let roughness_texture = m.metallic_roughness.as_ref();
+    let has_image = |place: &TextureRef| scene.images.get(place.image).is_some_and(Option::is_some);
+    if m.normal.is_none() && anisotropy.is_none() && !roughness_texture.is_some_and(has_image) {
         return Err(NoSurface::Plain);
     }
-    let roughness_texture = m.metallic_roughness.as_ref();
     let maps = [
         ("normalTexture", m.normal.as_ref()),
         ("anisotropyTexture", anisotropy_texture),

@@ -368,8 +368,514 @@ fn a_roughness_that_nobody_gave_is_assumed_in_silence() {
     }
     let (warnings, _) = assumed(&["a_normal.png", "a_blob.png"], &plain);
     assert!(warnings[0].contains("not recognised: a_blob.png"), "{warnings:?}");
-    let (_, rows) = assumed(&["a_rough.png", "a_ao.png"], &plain);
+    let (_, rows) = assumed(&["a_normal.png", "a_rough.png", "a_ao.png"], &plain);
     assert_eq!(rows, ["metallic: no map: 0 everywhere, no metal"]);
+}
+
+#[test]
+fn a_normal_map_that_is_not_there_is_flat_in_silence() {
+    for names in [&["a_rough.png"][..], &["a_glossU.png", "a_glossV.png"], &["a_orm.png", "a_color.png"]] {
+        let (warnings, rows) = assumed(names, &Hints::default());
+        assert!(warnings[0].starts_with("a: no normal map, the surface is taken to be flat"), "{warnings:?}");
+        assert!(rows[0].starts_with("normal: warning: no map, the surface is flat"), "{rows:?}");
+    }
+    let (warnings, _) = assumed(&["a_rough.png", "blob.png"], &Hints::default());
+    assert!(warnings[0].contains("not recognised: blob.png"), "{warnings:?}");
+    // Without a surface no normals are written.
+    let (warnings, rows) = assumed(&["a_color.png"], &Hints::default());
+    assert!(warnings.is_empty() && rows.is_empty(), "{warnings:?} {rows:?}");
+}
+
+/// Materials as "name: role role", by the files that are used.
+fn materials(folder: &Folder) -> Vec<String> {
+    let one = |material: &MaterialMaps| {
+        let roles: Vec<&str> = material.files.iter().map(|(role, _)| role.name()).collect();
+        format!("{}: {}", material.name, roles.join(" "))
+    };
+    folder.materials.iter().map(one).collect()
+}
+
+#[test]
+fn sets_as_exporters_name_them_fall_apart_or_together() {
+    type Case<'a> = (&'a str, &'a [&'a str], &'a [&'a str]);
+    let cases: &[Case] = &[
+        (
+            "Poliigon, by metalness",
+            &[
+                "BrushedSteel01_COL_2K_METALNESS.png",
+                "BrushedSteel01_DISP_2K_METALNESS.png",
+                "BrushedSteel01_METALNESS_2K_METALNESS.png",
+                "BrushedSteel01_NRM_2K_METALNESS.png",
+                "BrushedSteel01_ROUGHNESS_2K_METALNESS.png",
+                "BrushedSteel01_sphere.png",
+            ],
+            &["BrushedSteel01: normal roughness color metallic"],
+        ),
+        (
+            "Poliigon, both workflows",
+            &[
+                "Steel01_COL_2K_METALNESS.png",
+                "Steel01_NRM_2K_METALNESS.png",
+                "Steel01_COL_2K_SPECULAR.png",
+                "Steel01_GLOSS_2K_SPECULAR.png",
+                "Steel01_NRM_2K_SPECULAR.png",
+            ],
+            &["Steel01_METALNESS: normal color", "Steel01_SPECULAR: normal gloss color"],
+        ),
+        (
+            "Poliigon, by specular",
+            &[
+                "Oak01_AO_3K.jpg",
+                "Oak01_COL_VAR1_3K.jpg",
+                "Oak01_DISP16_3K.png",
+                "Oak01_GLOSS_3K.jpg",
+                "Oak01_NRM_3K.jpg",
+                "Oak01_REFL_3K.jpg",
+            ],
+            &["Oak01: normal gloss color occlusion"],
+        ),
+        (
+            "Poliigon, new",
+            &[
+                "Poliigon_WoodOak_2070_Normal.png",
+                "Poliigon_WoodOak_2070_Roughness.jpg",
+                "Poliigon_WoodOak_2070_BaseColor.jpg",
+                "Poliigon_WoodOak_2070_Metallic.jpg",
+            ],
+            &["Poliigon_WoodOak_2070: normal roughness color metallic"],
+        ),
+        (
+            "Megascans, with both",
+            &[
+                "vbkm_2K_Albedo.jpg",
+                "vbkm_2K_Cavity.jpg",
+                "vbkm_2K_Gloss.jpg",
+                "vbkm_2K_Normal_LOD0.jpg",
+                "vbkm_2K_Roughness.jpg",
+                "vbkm_2K_Specular.jpg",
+            ],
+            &["vbkm: normal roughness color"],
+        ),
+        (
+            "Megascans in Fab",
+            &["T_rkswd_4K_B.png", "T_rkswd_4K_N.png", "T_rkswd_4K_ORM.png"],
+            &["rkswd: normal color orm"],
+        ),
+        (
+            "Quixel for Unreal",
+            &["T_rock_sfDgc_2K_D.png", "T_rock_sfDgc_2K_N.png", "T_rock_sfDgc_2K_ORDp.png"],
+            &["rock_sfDgc: normal color occlusion-roughness"],
+        ),
+        (
+            "Painter for Unity",
+            &[
+                "Gun_AlbedoTransparency.png",
+                "Gun_MetallicSmoothness.png",
+                "Gun_Normal.png",
+                "Gun_Emission.png",
+            ],
+            &["Gun: normal color metallic-smoothness"],
+        ),
+        (
+            "Painter for Unity, by specular",
+            &["Gun_AlbedoTransparency.png", "Gun_SpecularSmoothness.png", "Gun_Normal.png"],
+            &["Gun: normal color specular-smoothness"],
+        ),
+        (
+            "Painter for HDRP",
+            &["Gun_BaseMap.png", "Gun_MaskMap.png", "Gun_Normal.png", "Gun_Emissive.png"],
+            &["Gun: normal color mask-map"],
+        ),
+        (
+            "Painter for URP",
+            &["Gun_BaseMap.png", "Gun_MetallicSmoothness.png", "Gun_Normal.png", "Gun_Occlusion.png"],
+            &["Gun: normal color occlusion metallic-smoothness"],
+        ),
+        (
+            "Painter for Unreal",
+            &["M_Gun_BaseColor.png", "M_Gun_Normal.png", "M_Gun_OcclusionRoughnessMetallic.png"],
+            &["M_Gun: normal color orm"],
+        ),
+        (
+            "Painter's colour spaces",
+            &[
+                "Gun_BaseColor_Utility - sRGB - Texture.png",
+                "Gun_Metallic_ACEScg.png",
+                "Gun_Normal_Utility - Raw.png",
+                "Gun_Roughness_Raw.png",
+            ],
+            &["Gun: normal roughness color metallic"],
+        ),
+        (
+            "Blender's colour spaces",
+            &["Gun_Normal_Non-Color.png", "Gun_Roughness_Non-Color.png", "Gun_Base Color_sRGB.png"],
+            &["Gun: normal roughness color"],
+        ),
+        (
+            "Painter's bakes",
+            &[
+                "Gun_Ambient Occlusion Map from Mesh.png",
+                "Gun_Curvature Map from Mesh.png",
+                "Gun_Normal Map from Mesh.png",
+                "Gun_Roughness.png",
+                "Gun_World Space Normals.png",
+            ],
+            &["Gun: roughness", "Gun_from_Mesh: normal occlusion"],
+        ),
+        (
+            "UDIM behind",
+            &[
+                "Head_Normal.1001.png",
+                "Head_Normal.1002.png",
+                "Head_Roughness.1001.png",
+                "Head_Roughness.1002.png",
+            ],
+            &["Head_1001: normal roughness", "Head_1002: normal roughness"],
+        ),
+        (
+            "UDIM behind, of one tile",
+            &["Head_Normal_1001.png", "Head_Roughness_1001.png"],
+            &["Head_1001: normal roughness"],
+        ),
+        (
+            "UDIM and a side of 1024",
+            &["Head_Normal.1023.png", "Head_Normal.1024.png", "Head_Rough.1023.png", "Head_Rough.1024.png"],
+            &["Head_1023: normal roughness", "Head_1024: normal roughness"],
+        ),
+        (
+            "UDIM before",
+            &["Head.1001_Normal.png", "Head.1001_Roughness.png", "Head.1002_Normal.png"],
+            &["Head.1001: normal roughness", "Head.1002: normal"],
+        ),
+        (
+            "tiles of Mudbox",
+            &["Head_Normal_u1_v1.png", "Head_Rough_u1_v1.png", "Head_Normal_u2_v1.png"],
+            &["Head_u1_v1: normal roughness", "Head_u2_v1: normal"],
+        ),
+        (
+            "3D-Coat",
+            &["Lambert1_color.tga", "Lambert1_gloss.tga", "Lambert1_metalness.tga", "Lambert1_nmap.tga"],
+            &["Lambert1: normal gloss color metallic"],
+        ),
+        (
+            "Marmoset",
+            &["gun_albedo.tga", "gun_gloss.tga", "gun_normals.tga", "gun_normals_object.tga"],
+            &["gun: normal gloss color"],
+        ),
+        (
+            "Arnold",
+            &["Gun_BaseColor.png", "Gun_Metalness.png", "Gun_Normal.png", "Gun_Roughness.png", "Gun_ior.png"],
+            &["Gun: normal roughness color metallic"],
+        ),
+        (
+            "textures.com",
+            &[
+                "TexturesCom_Metal_Brushed_1K_albedo.png",
+                "TexturesCom_Metal_Brushed_1K_height.png",
+                "TexturesCom_Metal_Brushed_1K_normal.png",
+                "TexturesCom_Metal_Brushed_1K_roughness.png",
+            ],
+            &["TexturesCom_Metal_Brushed: normal roughness color"],
+        ),
+        (
+            "freepbr",
+            &["rusted-steel-albedo.png", "rusted-steel-metallic.png", "rusted-steel-normal-ogl.png"],
+            &["rusted-steel: normal color metallic"],
+        ),
+        (
+            "cgbookcase",
+            &["Fabric01_MR_2K_BaseColor.png", "Fabric01_MR_2K_Normal.png", "Fabric01_MR_2K_Roughness.png"],
+            &["Fabric01_MR: normal roughness color"],
+        ),
+        (
+            "sharetextures",
+            &["wood_1-2K_normal-2K.png", "wood_1-2K_roughness-2K.png"],
+            &["wood_1: normal roughness"],
+        ),
+        (
+            "Blender's bakes",
+            &["Cube Normal.png", "Cube Roughness.png", "Material.001_normal.png", "Material.002_normal.png"],
+            &["Cube: normal roughness", "Material.001: normal", "Material.002: normal"],
+        ),
+        (
+            "Blender's glTF",
+            &["wood_baseColor.png", "wood_metallic-wood_roughness.png", "wood_normal.png"],
+            &["wood: normal color metallic-roughness"],
+        ),
+        (
+            "Sketchfab",
+            &["Scene_-_Root_baseColor.jpeg", "Scene_-_Root_metallicRoughness.png", "Scene_-_Root_normal.png"],
+            &["Scene_-_Root: normal color metallic-roughness"],
+        ),
+        (
+            "packed in other orders",
+            &["a_AO_R_M.png", "a_Normal.png", "b_MRAO.png", "b_Normal.png", "c_RMO.png", "c_Normal.png"],
+            &["a: normal orm", "b: normal mra", "c: normal rma"],
+        ),
+        (
+            "roughness and occlusion in one",
+            &["rock_06_diff_1k.jpg", "rock_06_nor_gl_1k.exr", "rock_06_rough_ao_1k.jpg"],
+            &["rock_06: normal color occlusion-roughness"],
+        ),
+        (
+            "the occlusion of what is called rough",
+            &["old_rough_ao.png", "old_rough_normal.png", "old_rough_rough.png"],
+            &["old_rough: normal roughness occlusion"],
+        ),
+        ("copies", &["steel_normal (1).png", "steel_roughness (1).png"], &["steel: normal roughness"]),
+        ("a copy", &["Wood_Normal copy.png", "Wood_Roughness.png"], &["Wood: normal roughness"]),
+        ("a second copy", &["Wood_Normal copy 2.png", "Wood_Roughness.png"], &["Wood: normal roughness"]),
+        ("versions", &["Wood_Normal_v002.png", "Wood_Roughness_v002.png"], &["Wood: normal roughness"]),
+        ("final", &["Wood_Normal_final.png", "Wood_Roughness_final.png"], &["Wood: normal roughness"]),
+        (
+            "a word of the whole set",
+            &["Wood_Normal_approved.png", "Wood_Roughness_approved.png"],
+            &["Wood: normal roughness"],
+        ),
+        (
+            "variants",
+            &["W_Normal_red.png", "W_Rough_red.png", "W_Normal_blue.png", "W_Rough_blue.png"],
+            &["W_blue: normal roughness", "W_red: normal roughness"],
+        ),
+        ("the role before", &["normal_brick.png", "roughness_brick.png"], &["brick: normal roughness"]),
+        (
+            "a material called as a role",
+            &["Metallic_Base_Color.png", "Metallic_Metallic.png", "Metallic_Normal.png"],
+            &["Metallic: normal color metallic"],
+        ),
+        (
+            "materials called as roles",
+            &[
+                "Wall_Metal_Normal.png",
+                "Wall_Metal_Rough.png",
+                "Wall_Rough_Normal.png",
+                "Wall_Rough_Rough.png",
+            ],
+            &["Wall_Metal: normal roughness", "Wall_Rough: normal roughness"],
+        ),
+        (
+            "materials called as roles, of one map each",
+            &["Wall_Metal_Normal.png", "Wall_Rough_Normal.png"],
+            &["Wall_Metal: normal", "Wall_Rough: normal"],
+        ),
+        (
+            "a role's name in a material's",
+            &["Rusty_Metal_2K_Color.png", "Rusty_Metal_2K_Normal.png", "Rusty_Metal_2K_Roughness.png"],
+            &["Rusty_Metal: normal roughness color"],
+        ),
+    ];
+    for (what, names, wanted) in cases {
+        let folder = scanned(names, &Hints::default()).unwrap_or_else(|e| panic!("{what}: {e}"));
+        assert_eq!(materials(&folder), *wanted, "{what}:\n{}", folder.table());
+    }
+}
+
+#[test]
+fn a_variant_that_nothing_speaks_for_is_told() {
+    let names = ["Wood_Color_Red.png", "Wood_Normal.png", "Wood_Roughness.png"];
+    let folder = scanned(&names, &Hints::default()).unwrap();
+    assert_eq!(materials(&folder), ["Wood: normal roughness"], "{}", folder.table());
+    let row = folder.rows.iter().find(|row| row.file == names[0]).unwrap();
+    assert!(row.note.contains("--map color=Wood_Color_Red.png"), "{row:?}");
+    let named = only(&names, &maps(&[(Role::Color, "Wood_Color_Red.png")]));
+    assert_eq!(named.files.len(), 3, "{named:?}");
+}
+
+#[test]
+fn an_archives_inner_folder_is_not_looked_into() {
+    let dir = folder_of(&["rock.blend", "preview.png"]);
+    let inner = dir.path().join("textures");
+    fs::create_dir(&inner).unwrap();
+    for name in ["normal.png", "roughness.png", "LICENSE"] {
+        fs::write(inner.join(name), b"").unwrap();
+    }
+    let folder = scan(dir.path(), &Hints::default()).unwrap();
+    assert_eq!(materials(&folder), [format!("{}: normal roughness", file(dir.path()))]);
+    for name in ["textures/normal.png", "textures/LICENSE", "rock.blend", "preview.png"] {
+        assert!(folder.rows.iter().any(|row| row.file == name), "no {name} in\n{}", folder.table());
+    }
+    // Its own maps go before, and so does a model that they belong to.
+    for own in ["own_normal.png", "rock.gltf"] {
+        fs::write(dir.path().join(own), b"").unwrap();
+        let rows = scan(dir.path(), &Hints::default()).map_or(Vec::new(), |folder| folder.rows);
+        assert!(rows.iter().all(|row| !row.file.starts_with("textures/")), "{own}: {rows:?}");
+        fs::remove_file(dir.path().join(own)).unwrap();
+    }
+}
+
+// Files that are not read
+
+#[test]
+fn a_map_that_is_not_read_is_baked_flat_in_silence() {
+    let names = ["mat_normal.avif", "mat_roughness.png"];
+    let error = refused(&names, &Hints::default());
+    for part in
+        ["mat_normal.avif", "the normal map of mat", ".avif files are not read", "--ignore mat_normal.avif"]
+    {
+        assert!(error.contains(part), "wanted \"{part}\" in: {error}");
+    }
+    let ignored = Hints { ignore: vec!["mat_normal.avif".into()], ..Hints::default() };
+    let (warnings, rows) = assumed(&names, &ignored);
+    assert!(warnings[0].contains("no normal map") && rows[0].starts_with("normal"), "{warnings:?} {rows:?}");
+    // The source of a map that is there, and a picture that is no map.
+    let folder =
+        scanned(&["mat_normal.psd", "mat_normal.png", "mat_rough.png", "cat.gif"], &Hints::default());
+    let folder = folder.unwrap();
+    let note = |name: &str| folder.rows.iter().find(|row| row.file == name).unwrap().note.clone();
+    assert_eq!(note("mat_normal.psd"), "not used: .psd is not read, mat_normal.png is");
+    assert_eq!(note("cat.gif"), "not recognised, not used");
+}
+
+#[test]
+fn files_of_a_folder_vanish() {
+    let names =
+        ["a_normal.png", "a_rough.png", "a.mtlx", "README", "a_height.exr", "photo.jpg", "a.normal.png.meta"];
+    let folder = scanned(&names, &Hints::default()).unwrap();
+    for name in names {
+        assert_eq!(
+            folder.rows.iter().filter(|row| row.file == name).count(),
+            1,
+            "{name}:\n{}",
+            folder.table()
+        );
+    }
+    assert!(folder.rows.iter().any(|row| row.file == "README" && !row.is_picture()), "{}", folder.table());
+}
+
+// Twins
+
+/// The material of painted files, loaded, and the name of its normal or roughness map.
+fn load_twins(
+    files: &[(&str, &Image)],
+    hints: &Hints,
+    role: Role,
+) -> Result<(String, LoadedMaterial), FolderError> {
+    let loaded = load_one(files, hints)?;
+    let used: Vec<String> =
+        loaded.images.iter().filter(|map| map.role == role).map(|map| file(&map.path)).collect();
+    assert_eq!(used.len(), 1, "{used:?}");
+    Ok((used[0].clone(), loaded))
+}
+
+#[test]
+fn two_normal_maps_are_told_apart_by_their_names() {
+    let (up, down, flat) = (waves(Green::Up), waves(Green::Down), grey(0.5));
+    let rough = ("w_rough.png", &flat);
+    let plain = Hints::default();
+    let pointing = |green| Hints { green: Some(green), ..Hints::default() };
+    // Files, what is asked for, the file that is used, which way its green points, whether that is told.
+    type Case<'a> = ([(&'a str, &'a Image); 2], Hints, &'a str, Green, bool);
+    let cases: [Case; 8] = [
+        ([("w_normal.png", &up), ("w_nrm.png", &up)], plain.clone(), "w_normal.png", Green::Up, false),
+        ([("w_normal.png", &up), ("w_NormalGL.png", &up)], plain.clone(), "w_NormalGL.png", Green::Up, false),
+        (
+            [("w_NormalDX.png", &down), ("w_NormalGL.png", &up)],
+            plain.clone(),
+            "w_NormalGL.png",
+            Green::Up,
+            false,
+        ),
+        (
+            [("w_NormalDX.png", &down), ("w_NormalGL.png", &up)],
+            pointing(Green::Down),
+            "w_NormalDX.png",
+            Green::Down,
+            false,
+        ),
+        // The names have it the wrong way round.
+        (
+            [("w_NormalDX.png", &up), ("w_NormalGL.png", &down)],
+            plain.clone(),
+            "w_NormalDX.png",
+            Green::Up,
+            true,
+        ),
+        (
+            [("w_NormalDX.png", &up), ("w_NormalGL.png", &down)],
+            pointing(Green::Down),
+            "w_NormalGL.png",
+            Green::Down,
+            true,
+        ),
+        // One file under both names.
+        (
+            [("w_NormalDX.png", &down), ("w_NormalGL.png", &down)],
+            plain.clone(),
+            "w_NormalGL.png",
+            Green::Down,
+            true,
+        ),
+        ([("w_normal.png", &down), ("w_nrm.png", &up)], plain.clone(), "w_nrm.png", Green::Up, true),
+    ];
+    for (i, (files, hints, wanted, green, told)) in cases.into_iter().enumerate() {
+        let (used, loaded) = load_twins(&[files[0], files[1], rough], &hints, Role::Normal)
+            .unwrap_or_else(|e| panic!("case {i}: {e}"));
+        let y_down = loaded.surface.unwrap().normal.y_down;
+        assert_eq!((used.as_str(), y_down), (wanted, green == Green::Down), "case {i}: {:?}", loaded.notes);
+        assert_eq!(
+            loaded.notes.iter().any(|note| note.contains("by its slopes")),
+            told,
+            "case {i}: {:?}",
+            loaded.notes
+        );
+    }
+    let other = image(64, Channels::Rgb, |u, _| {
+        let x = 0.4 * (TAU * 3.0 * u).sin();
+        [0.5 + 0.5 * x, 0.5, 0.5 + 0.5 * (1.0 - x * x).sqrt(), 1.0]
+    });
+    let small = image(32, Channels::Rgb, |_, _| [0.5, 0.5, 1.0, 1.0]);
+    for differs in [&other, &small] {
+        let error = load_twins(&[("w_normal.png", &up), ("w_nrm.png", differs), rough], &plain, Role::Normal);
+        let error = error.unwrap_err().to_string();
+        for part in ["several normal maps, and their texels differ", "--map normal=w_nrm.png", "--ignore"] {
+            assert!(error.contains(part), "wanted \"{part}\" in: {error}");
+        }
+    }
+}
+
+#[test]
+fn gloss_beside_roughness_is_asked_about_though_it_says_the_same() {
+    let wave = |gain: f32, over: bool| {
+        image(64, Channels::R, move |u, v| {
+            let value = 0.5 + gain * (TAU * (3.0 * u + v)).sin();
+            [if over { 1.0 - value } else { value }; 4]
+        })
+    };
+    let (rough, gloss, other) = (wave(0.3, false), wave(0.3, true), wave(0.2, true));
+    let normal = waves(Green::Up);
+    let files = |gloss| [("w_normal.png", &normal), ("w_rough.png", &rough), ("w_gloss.png", gloss)];
+    let (used, _) = load_twins(&files(&gloss), &Hints::default(), Role::Roughness).unwrap();
+    assert_eq!(used, "w_rough.png");
+    let error = load_one(&files(&other), &Hints::default()).unwrap_err().to_string();
+    for part in
+        ["both roughness and gloss", "opposite", "--map gloss=w_gloss.png", "--map roughness=w_rough.png"]
+    {
+        assert!(error.contains(part), "wanted \"{part}\" in: {error}");
+    }
+    // A flag settles it without a look.
+    let (used, _) = load_twins(&files(&other), &maps(&[(Role::Gloss, "w_gloss.png")]), Role::Gloss).unwrap();
+    assert_eq!(used, "w_gloss.png");
+    // Two of the same role, of which one has sixteen bits by its name.
+    let files = [("w_rough.png", &rough), ("w_rough16.png", &rough), ("w_normal.png", &normal)];
+    assert_eq!(load_twins(&files, &Hints::default(), Role::Roughness).unwrap().0, "w_rough16.png");
+    let files = [("w_rough.png", &rough), ("w_roughness.png", &other), ("w_normal.png", &normal)];
+    let error = load_one(&files, &Hints::default()).unwrap_err().to_string();
+    assert!(error.contains("several files for one map"), "{error}");
+}
+
+#[test]
+fn specular_colour_with_gloss_in_alpha_is_gloss() {
+    let rgba = image(8, Channels::Rgba, |_, _| [0.2, 0.5, 0.1, 0.7]);
+    let loaded = load_one(&[("x_SpecularSmoothness.png", &rgba)], &Hints::default()).unwrap();
+    assert_near(first_texel(&loaded), 0.09, 0.09, Vec2::X, "specular smoothness");
+    let rough_ao = image(8, Channels::Rgb, |_, _| [0.9, 0.4, 0.0, 1.0]);
+    let loaded = load_one(&[("x_rough_ao.png", &rough_ao)], &Hints::default()).unwrap();
+    assert_near(first_texel(&loaded), 0.16, 0.16, Vec2::X, "green of rough_ao");
+    assert!(
+        loaded.notes.iter().any(|note| note.contains("--map roughness=x_rough_ao.png")),
+        "{:?}",
+        loaded.notes
+    );
 }
 
 // Questions
@@ -382,36 +888,6 @@ fn what_can_be_read_in_two_ways_is_asked_by_a_flag_that_then_settles_it() {
         settled: Hints,
     }
     let cases = [
-        Case {
-            names: &["w_normal.png", "w_nrm.png"],
-            says: &["several normal maps", "w_normal.png, w_nrm.png", "--map normal=w_nrm.png", "--ignore"],
-            settled: maps(&[(Role::Normal, "w_nrm.png")]),
-        },
-        Case {
-            names: &["w_normal.png", "w_NormalGL.png"],
-            says: &["several normal maps"],
-            settled: Hints { ignore: vec!["w_normal.png".into()], ..Hints::default() },
-        },
-        Case {
-            names: &["w_1k_NormalGL.png", "w_2k_NormalGL.png"],
-            says: &["several normal maps"],
-            settled: maps(&[(Role::Normal, "w_2k_NormalGL.png")]),
-        },
-        Case {
-            names: &["w_normal.png", "w_rough.png", "w_gloss.png"],
-            says: &[
-                "both roughness and gloss",
-                "w_gloss.png",
-                "--map gloss=w_gloss.png",
-                "--map roughness=w_rough.png",
-            ],
-            settled: maps(&[(Role::Gloss, "w_gloss.png")]),
-        },
-        Case {
-            names: &["w_albedo.png", "w_diffuse.png", "w_normal.png"],
-            says: &["several color maps", "--map color=w_diffuse.png"],
-            settled: maps(&[(Role::Color, "w_albedo.png")]),
-        },
         Case {
             names: &["w_normal.png", "w_spec.png"],
             says: &["_spec can mean gloss", "--map gloss=w_spec.png", "--roughness VALUE"],
@@ -916,6 +1392,7 @@ fn sample_assets_of_another_kind_pass_for_normals() {
                 metallic: None,
                 files: vec![(Role::Normal, wrong.clone())],
                 wrap: Hints::default().wrap,
+                twins: Vec::new(),
                 warnings: Vec::new(),
             };
             let error = material.load().map(|_| ()).expect_err(&wrong.display().to_string()).to_string();

@@ -137,6 +137,8 @@ pub struct Document {
     /// Textures and images that the original refers to; only these are dropped once nothing does.
     original_textures: BTreeSet<usize>,
     original_images: BTreeSet<usize>,
+    /// Extensions that stood somewhere in the original; only these are no longer listed once they stand nowhere.
+    original_extensions: BTreeSet<String>,
     /// Images that [`Document::add_image_file`] has added: the caller writes their files.
     added_images: BTreeSet<usize>,
     /// Buffer, first byte and length of what nothing refers to any more.
@@ -177,6 +179,7 @@ impl Document {
         check_shape(path, &json)?;
         let original_textures = used_textures(&mut json);
         let original_images = used_images(&mut json);
+        let original_extensions = used_extensions(&json);
         Ok(Document {
             path: path.to_path_buf(),
             allowed: Vec::new(),
@@ -185,6 +188,7 @@ impl Document {
             chunks: container.others.iter().map(|(kind, bytes)| (*kind, bytes.to_vec())).collect(),
             original_textures,
             original_images,
+            original_extensions,
             added_images: BTreeSet::new(),
             freed: Vec::new(),
             added_buffer: None,
@@ -512,6 +516,7 @@ impl Document {
         for &(buffer, start, length) in &self.freed {
             dropped_views.entry(buffer).or_default().push((start, start.saturating_add(length)));
         }
+        self.drop_extensions(&mut output.json);
         let bin = self.place_buffers(path, glb, &dropped_views, &mut output)?;
         self.place_images(path, &mut output)?;
 
@@ -582,6 +587,23 @@ impl Document {
         let renumbered = remove(&mut output.json, "bufferViews", &views);
         for_each_view_index(&mut output.json, &mut |holder| renumber(holder, "bufferView", &renumbered));
         ranges
+    }
+
+    /// Takes extensions that stood in the original and stand nowhere now from the lists of what is used and required.
+    fn drop_extensions(&self, json: &mut Object) {
+        let used = used_extensions(json);
+        let gone = |name: &Value| {
+            name.as_str().is_some_and(|name| self.original_extensions.contains(name) && !used.contains(name))
+        };
+        for list in ["extensionsUsed", "extensionsRequired"] {
+            if !array(json, list).iter().any(gone) {
+                continue;
+            }
+            array_mut(json, list).retain(|name| !gone(name));
+            if array(json, list).is_empty() {
+                json.shift_remove(list);
+            }
+        }
     }
 
     /// Cuts dropped bytes out of the buffers and decides where each buffer goes; gives the binary chunk.
@@ -1043,6 +1065,26 @@ type VisitAll = fn(&mut Object, &mut dyn FnMut(&mut Object));
 fn collect(json: &mut Object, key: &str, visit_all: VisitAll) -> BTreeSet<usize> {
     let mut found = BTreeSet::new();
     visit_all(json, &mut |holder| found.extend(holder.get(key).and_then(index)));
+    found
+}
+
+/// The names of what stands in an `extensions` object anywhere.
+fn used_extensions(json: &Object) -> BTreeSet<String> {
+    fn walk(object: &Object, found: &mut BTreeSet<String>) {
+        if let Some(extensions) = object.get("extensions").and_then(Value::as_object) {
+            found.extend(extensions.keys().cloned());
+        }
+        object.values().for_each(|value| walk_value(value, found));
+    }
+    fn walk_value(value: &Value, found: &mut BTreeSet<String>) {
+        match value {
+            Value::Object(object) => walk(object, found),
+            Value::Array(values) => values.iter().for_each(|value| walk_value(value, found)),
+            _ => {}
+        }
+    }
+    let mut found = BTreeSet::new();
+    walk(json, &mut found);
     found
 }
 

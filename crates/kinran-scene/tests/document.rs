@@ -374,3 +374,37 @@ fn files_outside_the_folder_are_copied_into_it_and_several_buffers_become_one() 
     assert_eq!(again.json()["images"], json!([{ "uri": "wood%20grain.png" }]));
     assert_eq!(std::fs::read(folder.path().join("out/wood grain.png")).unwrap(), b"wood");
 }
+
+/// Files of other folders lose those folders, and what has the same name there must not lose its content.
+#[test]
+fn files_of_one_name_in_two_folders_become_one() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a", "b", "c", "model", "out"] {
+        std::fs::create_dir(folder.path().join(name)).unwrap();
+    }
+    for (file, content) in [("a/n.png", "a"), ("b/n.png", "b"), ("c/n.png", "a"), ("model/N_2.png", "own")] {
+        std::fs::write(folder.path().join(file), content).unwrap();
+    }
+    let uris = ["../a/n.png", "../b/n.png", "../c/n.png", "N_2.png"];
+    let textures: Vec<Value> = (0..uris.len()).map(|image| json!({ "source": image })).collect();
+    let json = json!({
+        "asset": { "version": "2.0" },
+        "images": uris.map(|uri| json!({ "uri": uri })),
+        "textures": textures,
+    });
+    let path = folder.path().join("model/m.gltf");
+    std::fs::write(&path, serde_json::to_vec(&json).unwrap()).unwrap();
+    let written = folder.path().join("out/m.gltf");
+    let allowed = ["a", "b", "c"].map(|name| folder.path().join(name));
+    Document::open_allowing(&path, &allowed).unwrap().write(&written).unwrap();
+    let again = Document::open(&written).unwrap();
+    let mut names = Vec::new();
+    for (i, uri) in uris.iter().enumerate() {
+        let wanted = std::fs::read(folder.path().join("model").join(uri)).unwrap();
+        assert_eq!(*again.image_bytes(i).unwrap(), *wanted, "{uri}");
+        names.push(again.json()["images"][i]["uri"].as_str().unwrap().to_lowercase());
+    }
+    // The same content is one file.
+    assert_eq!(names[0], names[2]);
+    assert!(names[0] != names[1] && names[1] != names[3], "{names:?}");
+}

@@ -1,6 +1,7 @@
 //! `kinran bake`: engine-ready textures from a folder of maps or a glTF file.
 
 pub(crate) mod curvature;
+mod flags;
 mod folder;
 mod gltf;
 mod library;
@@ -18,6 +19,7 @@ use kinran_image::{
 };
 use kinran_scene::{Wrap, is_gltf};
 
+use self::flags::{Flag, On};
 use crate::content::Content;
 use crate::init::{MANIFEST, Survey};
 use crate::model::ModelArgs;
@@ -26,6 +28,7 @@ use crate::values::{filter, number};
 use crate::{Console, Error};
 
 pub use curvature::{CurvatureArgs, CurvatureReport};
+use curvature::{MethodName, Which};
 pub use folder::bake_folder;
 pub use gltf::bake_gltf;
 pub(crate) use gltf::normal_remarks;
@@ -39,7 +42,7 @@ pub use report::{Input, Output, Report, SurfaceReport};
 /// which settles it. Each material becomes NAME_normal and NAME_aniso (and NAME_color, NAME_orm where there
 /// are such maps), and NAME.kinran.json, which says how they were made and what was lost on each level.
 ///
-/// A .glb or .gltf: every material with a normal map, or a map under anisotropy, gets normal, roughness and anisotropy
+/// A .glb or .gltf: every material with a normal, roughness or anisotropy map gets normal, roughness and anisotropy
 /// textures whose every level is right, in glTF's own terms; the model is written beside them.
 ///
 /// A kinran.toml: everything that it lists, in parallel; what has not changed is not baked again. See
@@ -290,19 +293,6 @@ impl From<PresetName> for Preset {
     }
 }
 
-/// Flags that say how a folder's maps are read, where a glTF file speaks for itself.
-const FOLDER_FLAGS: [&str; 9] = [
-    "edges",
-    "direction-span",
-    "map",
-    "ignore",
-    "roughness",
-    "anisotropy",
-    "roughness-is-gloss",
-    "force-normal",
-    "normal-blue",
-];
-
 impl Args {
     /// Where the files go.
     fn output(&self) -> &Path {
@@ -323,22 +313,6 @@ impl Args {
             normal_blue: self.normal_blue,
             wrap: self.wrap(),
         }
-    }
-
-    /// The first of [`FOLDER_FLAGS`] that is given.
-    fn folder_flag(&self) -> Option<&'static str> {
-        let given = [
-            self.edges != Edges::default(),
-            self.direction_span.is_some(),
-            !self.map.is_empty(),
-            !self.ignore.is_empty(),
-            self.roughness.is_some(),
-            self.anisotropy.is_some(),
-            self.roughness_is_gloss,
-            self.force_normal,
-            self.normal_blue,
-        ];
-        FOLDER_FLAGS.into_iter().zip(given).find_map(|(flag, given)| given.then_some(flag))
     }
 
     /// A map's encoding: the role's measured default, changed by what flags say.
@@ -397,15 +371,13 @@ impl Args {
 /// Whatever is wrong with the input, the flags or the output folder; nothing half-written stays.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if !args.input.is_dir() && has_extension(&args.input, "toml") {
-        if args.force {
-            return Err(Error::Usage("--force is for one folder or model; a kinran.toml needs none".into()));
+        if let Some(flag) = Flag::given(args, |on| on == On::One) {
+            return Err(Error::Usage(format!("--{} {}; leave it out", flag.name, flag.refusal())));
         }
         return bake_library(args, console);
     }
-    if args.library != LibraryArgs::default() {
-        return Err(Error::Usage(
-            "--watch, --jobs and --cache need a kinran.toml; name one as the input".into(),
-        ));
+    if let Some(flag) = Flag::given(args, |on| on == On::Library) {
+        return Err(Error::Usage(format!("--{} {}; name one, or leave it out", flag.name, flag.refusal())));
     }
     check_formats(args)?;
     let gltf = is_gltf(&args.input);
@@ -423,9 +395,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         check_folder(args.output())?;
     }
     let gltf = gltf && !args.input.is_dir();
-    if let Some(flag) = args.folder_flag().filter(|_| gltf) {
-        let reason =
-            format!("--{flag} is about folders of maps, and a glTF file says it itself; leave the flag out");
+    if let Some(flag) = args.idle_flag(gltf) {
+        let reason = format!("--{} {}; leave the flag out", flag.name, flag.refusal());
         return Err(Error::file_error(&args.input, reason));
     }
     match (gltf, args.dry_run) {

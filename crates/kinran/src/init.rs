@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
-use kinran_bake::folder::{Hints, Role, named_maps, scan};
+use kinran_bake::folder::{Hints, Role, inner_folder, named_maps, scan};
 use kinran_bake::manifest::Manifest;
 use kinran_image::write_atomically;
 use kinran_scene::Document;
@@ -300,7 +300,10 @@ impl Found {
                 self.leave_out(&path, format!("an OBJ brings no materials with maps; {way}"));
             }
         }
-        if !is_output && !named_maps(&full).unwrap_or_default().is_empty() {
+        // Maps in a folder called textures are those of the folder, but for the one that is looked through.
+        let inner = inner_folder(&full);
+        let apart = folder == Path::new("") && inner.is_some();
+        if !is_output && !apart && !named_maps(&full).unwrap_or_default().is_empty() {
             self.folders.push(folder.to_path_buf());
         }
         let called = |name: &str| {
@@ -309,6 +312,9 @@ impl Found {
         };
         let pair = called("targets").zip(called("tiles"));
         for path in folders {
+            if !apart && inner.as_ref().is_some_and(|inner| *inner == root.join(&path)) {
+                continue;
+            }
             if pair.as_ref().is_none_or(|(targets, tiles)| path != *targets && path != *tiles) {
                 self.visit(root, &path)?;
             }
@@ -363,7 +369,7 @@ impl Found {
             let maps = |folder: &Path| -> Vec<(PathBuf, Role)> {
                 let maps = named_maps(&root.join(folder)).unwrap_or_default();
                 maps.into_iter()
-                    .filter_map(|(path, role, _)| Some((folder.join(path.file_name()?), role)))
+                    .filter_map(|(path, role, _)| Some((path.strip_prefix(root).ok()?.to_path_buf(), role)))
                     .collect()
             };
             let all_tiles = maps(&tiles);

@@ -19,7 +19,7 @@ use kinran_shading::skin::profile::Gaussian;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::bake::curvature::{Blur, Joined, MethodName, deviations, meshes, pose_scale, unit};
+use crate::bake::curvature::{Blur, Joined, MethodName, deviations, measured, meshes, pose_scale, unit};
 use crate::picture::{Color, INK, PAPER, Picture, Row, grid};
 use crate::skin::{SIZE, profile, skin_table};
 use crate::skin_lut::plot::plot;
@@ -284,12 +284,9 @@ fn bake(
             continue;
         }
         let name = format!("mesh {}", scene.primitives[group[0]].source.mesh);
-        let of = |scene: &Scene| {
-            let primitives: Vec<&Primitive> = group.iter().map(|&i| &scene.primitives[i]).collect();
-            Joined::new(&primitives)
-        };
-        let mut surface = of(scene);
         if group.iter().any(|&i| scene.primitives[i].source.lacks_normals) {
+            let primitives: Vec<&Primitive> = group.iter().map(|&i| &scene.primitives[i]).collect();
+            let surface = Joined::new(&primitives);
             let normals = estimated_normals(&surface.positions, &surface.triangles);
             for (&i, &first) in group.iter().zip(&surface.firsts) {
                 let primitive = &mut scene.primitives[i];
@@ -302,8 +299,8 @@ fn bake(
                 primitive.tangents = primitive.normals.iter().map(|&n| any_tangent(n)).collect();
             }
             warnings.push(format!("{name} has no normals; smooth ones were estimated"));
-            surface = of(scene);
         }
+        let surface = measured(scene, &group, &name, warnings);
         let millimetres = args.unit_mm.map_or_else(|| unit(scene, &group, &name, warnings), f64::from)
             / pose_scale(&scene.primitives[group[0]]);
         let options = Options {

@@ -50,7 +50,7 @@ impl Mips {
     }
 }
 
-/// Surface textures of every material of `scene`, `None` for isotropic ones without a normal map, and a
+/// Surface textures of every material of `scene`, `None` for isotropic ones without a normal and a roughness map, and a
 /// sentence for each material whose maps could not be filtered together.
 ///
 /// # Errors
@@ -98,7 +98,8 @@ fn baked_maps<'a>(
     let anisotropy = m.anisotropy.as_ref().filter(|a| a.strength > 0.0);
     let anisotropy_map = anisotropy.and_then(|a| a.texture.as_ref());
     let normal = m.normal.as_ref();
-    if (normal.is_none() && m.aniso.is_none() && anisotropy_map.is_none())
+    let roughness = m.metallic_roughness.as_ref();
+    if (normal.is_none() && m.aniso.is_none() && anisotropy_map.is_none() && roughness.is_none())
         || m.normal_scale != 1.0
         || normal.is_some_and(is_image)
     {
@@ -107,7 +108,7 @@ fn baked_maps<'a>(
     if let Some(aniso) = m.aniso.as_ref().filter(|place| !is_image(place)) {
         return Some((normal, Some(aniso), AnisoEncoding::Texel));
     }
-    if m.metallic_roughness.iter().chain(anisotropy_map).any(is_image) {
+    if roughness.into_iter().chain(anisotropy_map).any(is_image) {
         return None;
     }
     let strength = anisotropy.map_or(0.0, |a| a.strength);

@@ -481,6 +481,226 @@ fn flags_about_folders_are_swallowed_by_models() {
     }
 }
 
+/// What is about meshes and materials is nothing that can be done to a folder of maps.
+#[test]
+fn flags_about_models_are_swallowed_by_folders() {
+    let input = cloth(32);
+    let parent = tempfile::tempdir().unwrap();
+    let out = parent.path().join("out");
+    let name = input.path().file_name().unwrap().to_str().unwrap();
+    for flags in [
+        &["--skin", "all"][..],
+        &["--curvature", "all"],
+        &["--curvature-method", "fit"],
+        &["--curvature-range", "1"],
+        &["--curvature-blur", "none"],
+        &["--unit-mm", "5"],
+        &["--estimate-normals"],
+        &["--curvature-dump", "json"],
+        &["--all-textures"],
+        &["--allow-outside", "."],
+    ] {
+        refused(&[&["bake", text(input.path()), "-o", text(&out)], flags].concat(), &[flags[0], name]);
+        assert!(!out.exists(), "{flags:?} wrote something");
+        let key = flags[0].trim_start_matches("--");
+        let value = flags.get(1).map_or("true".into(), |value| format!("\"{value}\""));
+        let manifest = parent.path().join("kinran.toml");
+        let entry = |own: &str, default: &str| {
+            let input = text(input.path());
+            format!("output = \"lib\"\n[defaults]\n{default}\n[[aniso]]\ninput = \"{input}\"\n{own}\n")
+        };
+        let setting = format!("{key} = {value}");
+        std::fs::write(&manifest, entry(&setting, "")).unwrap();
+        let said = kinran(&["bake", text(&manifest), "--dry-run"]);
+        assert_eq!(said.code, Some(2), "{key} of an entry: {}", said.err);
+        assert!(said.err.contains(key) && said.err.contains("folder"), "{key} of an entry: {}", said.err);
+        std::fs::write(&manifest, entry("", &setting)).unwrap();
+        let said = kinran(&["bake", text(&manifest), "--dry-run"]);
+        assert_eq!(said.code, Some(0), "{key} as a default: {}", said.err);
+    }
+}
+
+/// Flags about curvature that find no mesh to measure.
+#[test]
+fn flags_about_curvature_are_swallowed_where_nothing_is_measured() {
+    let (folder, model) = square();
+    let out = folder.path().join("out");
+    for flags in [&["--curvature-method", "fit"][..], &["--unit-mm", "5"], &["--curvature-dump", "json"]] {
+        for dry in [&["--dry-run"][..], &[]] {
+            let bake = [&["bake", text(&model), "-o", text(&out)], flags, dry];
+            let warnings = kinran_json(&bake.concat())["warnings"].to_string();
+            assert!(warnings.contains(flags[0]), "{flags:?}: {warnings}");
+            let warnings =
+                kinran_json(&[&bake.concat()[..], &["--skin", "all"]].concat())["warnings"].to_string();
+            assert!(!warnings.contains(flags[0]), "{flags:?}: {warnings}");
+        }
+    }
+}
+
+/// The document of a baked model.
+fn baked(out: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(out.join("square.gltf")).unwrap()).unwrap()
+}
+
+/// The name of the PNG that a use of a texture has.
+fn png(document: &Value, info: &Value) -> String {
+    let texture = &document["textures"][info["index"].as_u64().unwrap() as usize];
+    document["images"][texture["source"].as_u64().unwrap() as usize]["uri"].as_str().unwrap().into()
+}
+
+/// [`anisotropic_model`], changed.
+fn changed_model(folder: &Path, change: impl Fn(&mut Value)) -> PathBuf {
+    let model = anisotropic_model(folder);
+    let mut document: Value = serde_json::from_slice(&std::fs::read(&model).unwrap()).unwrap();
+    document["materials"][0]["extensions"].as_object_mut().unwrap().remove("EXT_made_up");
+    document["extensionsUsed"] = json!(["KHR_materials_anisotropy", "KHR_materials_clearcoat"]);
+    change(&mut document);
+    std::fs::write(&model, serde_json::to_vec(&document).unwrap()).unwrap();
+    model
+}
+
+/// Normal maps that are not filtered have a green too: those of a clearcoat, and one that lies apart from roughness.
+#[test]
+fn green_down_stays_down_where_no_filter_comes_by() {
+    let folder = tempfile::tempdir().unwrap();
+    let authored = bumps();
+    let turned = |file: &Path| {
+        let image = read_image(file).unwrap();
+        (0..32 * 32).all(|i| {
+            let (x, y) = (i % 32, i / 32);
+            let (wanted, got) = (authored.texel(x, y), image.texel(x, y));
+            let wanted = [wanted[0], 1.0 - wanted[1], wanted[2]];
+            (0..3).all(|c| (got[c] - wanted[c]).abs() < 1e-3)
+        })
+    };
+    let model = changed_model(folder.path(), |document| {
+        document["materials"][0]["extensions"]["KHR_materials_clearcoat"] =
+            json!({ "clearcoatFactor": 0.25, "clearcoatNormalTexture": { "index": 0, "scale": 0.5 } });
+    });
+    for (flag, wanted) in [("--y-down", true), ("--y-up", false)] {
+        let out = tempfile::tempdir().unwrap();
+        kinran_json(&["bake", text(&model), "-o", text(out.path()), flag]);
+        let document = baked(out.path());
+        let info =
+            &document["materials"][0]["extensions"]["KHR_materials_clearcoat"]["clearcoatNormalTexture"];
+        assert_eq!(info["scale"], 0.5, "{info}");
+        assert_eq!(turned(&out.path().join(png(&document, info))), wanted, "{flag}");
+    }
+    let model = changed_model(folder.path(), |document| {
+        document["materials"][0]["normalTexture"]["extensions"] =
+            json!({ "KHR_texture_transform": { "scale": [3.0, 2.0] } });
+    });
+    let out = tempfile::tempdir().unwrap();
+    kinran_json(&["bake", text(&model), "-o", text(out.path()), "--y-down"]);
+    let document = baked(out.path());
+    assert!(turned(&out.path().join(png(&document, &document["materials"][0]["normalTexture"]))));
+}
+
+/// A roughness map is filtered as it is under a normal map that is flat.
+#[test]
+fn roughness_is_filtered_only_where_a_normal_map_happens_to_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = |name: &str, with_normal: bool| {
+        let inner = folder.path().join(name);
+        std::fs::create_dir(&inner).unwrap();
+        let model = changed_model(&inner, |document| {
+            let mut material = json!({ "name": "plain", "pbrMetallicRoughness": {
+                "metallicFactor": 1.0, "metallicRoughnessTexture": { "index": 1 } } });
+            if with_normal {
+                material["normalTexture"] = json!({ "index": 0 });
+            }
+            document["materials"] = json!([material]);
+        });
+        write(&inner, "bumps.png", &image(1, Channels::Rgb, |_, _| [128, 128, 255, 255]));
+        // Perceptual roughness of 51/255 and 204/255, texel by texel.
+        let mixed = |x: u32, y: u32| [0, if (x + y).is_multiple_of(2) { 51 } else { 204 }, 255, 255];
+        write(&inner, "orm.png", &image(32, Channels::Rgb, mixed));
+        model
+    };
+    let models = [model("bare", false), model("flat", true)];
+    let levels = models.each_ref().map(|model| {
+        let out = tempfile::tempdir().unwrap();
+        let flags = ["--aniso-format", "rgba8", "--filter", "linear"];
+        kinran_json(&[&["bake", text(model), "-o", text(out.path())][..], &flags].concat());
+        let texture = read_texture(&out.path().join("square_plain_roughness.ktx2")).unwrap();
+        (0..texture.levels.len()).map(|level| texture.decode_level(level).unwrap()).collect::<Vec<_>>()
+    });
+    // Means of squared roughness, of alpha = r² that is r⁴.
+    let wanted = ((0.2f32.powi(4) + 0.8f32.powi(4)) / 2.0).powf(0.25);
+    for texel in levels[0][1..].iter().flatten() {
+        assert!((texel[1] - wanted).abs() < 1.0 / 255.0, "wanted {wanted}, got {texel:?}");
+    }
+    // A flat texel of 8 bits is not quite flat.
+    for (bare, flat) in levels[0].iter().flatten().zip(levels[1].iter().flatten()) {
+        assert!((0..4).all(|c| (bare[c] - flat[c]).abs() < 1.5 / 255.0), "without {bare:?}, with {flat:?}");
+    }
+    // And so it is drawn, from so far that a texel is a pixel's hundredth.
+    let pictures = models.each_ref().map(|model| {
+        let picture = model.with_extension("png");
+        let flags = ["--size", "12x12", "--spp", "16", "--env", "none", "--light", "0.3,0.2,1"];
+        let flags = [&flags[..], &["--filter", "linear", "--from", "0,0,1"]].concat();
+        let said = kinran(&[&["render", text(model), "-o", text(&picture)], &flags[..]].concat());
+        assert_eq!(said.code, Some(0), "{}", said.err);
+        read_image(&picture).unwrap()
+    });
+    let mut brightest = 0.0f32;
+    for i in 0..144 {
+        let [bare, flat] = pictures.each_ref().map(|picture| picture.texel(i % 12, i / 12));
+        brightest = brightest.max(bare[0]);
+        assert!((bare[0] - flat[0]).abs() < 4.0 / 255.0, "pixel {i}: without {bare:?}, with {flat:?}");
+    }
+    assert!(brightest > 0.1, "the picture is dark");
+}
+
+#[test]
+fn maps_that_lie_apart_are_said_not_to_be_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let transform =
+        |scale: f64| json!({ "KHR_texture_transform": { "rotation": 0.7, "scale": [scale, 2.0] } });
+    let model = |roughness: f64| {
+        changed_model(folder.path(), |document| {
+            let material = &mut document["materials"][0];
+            material["extensions"].as_object_mut().unwrap().remove("KHR_materials_anisotropy");
+            material["normalTexture"]["extensions"] = transform(3.1);
+            material["pbrMetallicRoughness"]["metallicRoughnessTexture"]["extensions"] = transform(roughness);
+        })
+    };
+    let out = tempfile::tempdir().unwrap();
+    let bake = |model: &Path| kinran_json(&["bake", text(model), "-o", text(out.path()), "--dry-run"]);
+    let apart = bake(&model(3.0));
+    let warnings = apart["warnings"].to_string();
+    assert!(warnings.contains("another way") && !warnings.contains("no material has"), "{warnings}");
+    assert_eq!(apart["surfaces"], json!([]));
+    // As one program and another round it.
+    for rounded in [3.1 * (1.0 + 1e-7), f64::from(3.1f32)] {
+        let same = bake(&model(rounded));
+        assert!(!same["warnings"].to_string().contains("another way"), "{rounded}: {}", same["warnings"]);
+        assert_eq!(same["surfaces"].as_array().unwrap().len(), 1, "{rounded}");
+    }
+}
+
+#[test]
+fn an_extension_that_a_bake_took_away_is_still_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = changed_model(folder.path(), |document| {
+        document["textures"][0]["extensions"] = json!({ "EXT_texture_webp": { "source": 0 } });
+        let used =
+            json!(["KHR_materials_anisotropy", "KHR_materials_clearcoat", "EXT_texture_webp", "KHR_xmp"]);
+        document["extensionsUsed"] = used;
+        document["extensionsRequired"] = json!(["EXT_texture_webp"]);
+    });
+    let out = tempfile::tempdir().unwrap();
+    kinran_json(&["bake", text(&model), "-o", text(out.path())]);
+    let document = baked(out.path());
+    let used = document["extensionsUsed"].as_array().unwrap();
+    assert!(!used.contains(&json!("EXT_texture_webp")), "{used:?}");
+    // What stood in the list alone is not ours to judge.
+    for kept in ["KHR_materials_anisotropy", "KHR_materials_clearcoat", "KHR_texture_basisu", "KHR_xmp"] {
+        assert!(used.contains(&json!(kept)), "no {kept} in {used:?}");
+    }
+    assert_eq!(document.get("extensionsRequired"), None);
+}
+
 /// The commonest fault of authored glTF: green that points down.
 #[test]
 fn green_down_in_a_model_is_not_noticed_or_not_turned() {

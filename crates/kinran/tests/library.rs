@@ -177,6 +177,24 @@ fn what_has_not_changed_is_baked_again() {
 }
 
 #[test]
+fn a_note_beside_the_maps_bakes_them_again() {
+    let library = Library::new(2);
+    // As an archive has them.
+    fs::create_dir(library.path("materials/cloth01/textures")).unwrap();
+    let inner = library.path("materials/cloth01/textures/normal.png");
+    fs::rename(library.path("materials/cloth01/normal.png"), inner).unwrap();
+    library.describe("[[aniso]]\ninput = \"materials/*\"\n");
+    assert!(all(&library.statuses(&[]), "baked"));
+    assert!(
+        library.output().keys().any(|file| file.contains("cloth01_normal")),
+        "{:?}",
+        library.output().keys()
+    );
+    fs::write(library.path("materials/cloth00/notes.txt"), "mine").unwrap();
+    assert!(all(&library.statuses(&[]), "up-to-date"));
+}
+
+#[test]
 fn lost_files_stay_lost_and_damage_is_copied() {
     let library = Library::new(2);
     library.statuses(&[]);

@@ -123,3 +123,20 @@ fn the_demo_looks_as_in_the_reference() {
     });
     check(&results.collect::<Vec<_>>());
 }
+
+/// Mesa looks for a display also where nothing is shown, and calls it an error that it finds no folder to look in.
+#[test]
+fn a_picture_that_is_drawn_is_called_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    kinran(&["--quiet", "demo", "--quick", "-o", folder.path().to_str().unwrap()]);
+    let (model, picture) = (folder.path().join("twill.glb"), folder.path().join("twill.png"));
+    let output = Command::new(env!("CARGO_BIN_EXE_kinran"))
+        .args(["render", model.to_str().unwrap(), "-o", picture.to_str().unwrap(), "--backend", "gpu"])
+        .args(["--size", "16x16", "--spp", "1", "--filter", "linear"])
+        .env_remove("XDG_RUNTIME_DIR")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).to_lowercase();
+    assert!(output.status.success() && picture.exists(), "{said}");
+    assert!(!said.contains("error"), "{said}");
+}

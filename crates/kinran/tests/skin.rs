@@ -476,6 +476,101 @@ fn a_skin_is_measured_by_its_node_or_its_vertices() {
     }
 }
 
+/// A sphere of 10 mm that its node makes an ellipsoid, turned, mirrored and used twice too.
+#[test]
+fn a_stretched_mesh_keeps_the_curvature_that_it_had() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut document, binary) = Mesh::sphere(0.01).document();
+    let turned = json!({ "mesh": 0, "scale": [1, 2, 1], "rotation": [0.6, 0.0, 0.0, 0.8] });
+    for (i, nodes) in [
+        json!([{ "mesh": 0, "scale": [1, 2, 1] }]),
+        json!([{ "mesh": 0, "scale": [-1, 2, 1] }]),
+        json!([turned, { "mesh": 0, "scale": [1, 2, 1] }]),
+        json!([{ "mesh": 0, "scale": [1, 2, 1] }, { "mesh": 0, "scale": [-1, 2, 1] }]),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        document["scenes"][0]["nodes"] = (0..nodes.as_array().unwrap().len()).collect();
+        document["nodes"] = nodes;
+        let model = folder.path().join(format!("ellipsoid{i}.glb"));
+        write_glb(&model, document.clone(), binary.clone());
+        let out = folder.path().join("out");
+        done(&["--quiet", "bake", str(&model), "-o", str(&out), "--skin", "all", "--curvature-blur", "none"]);
+        let scene = Scene::load(out.join(format!("ellipsoid{i}.glb"))).unwrap();
+        let primitive = &scene.primitives[0];
+        let curvature = primitive.curvature.as_ref().unwrap();
+        for (vertex, &code) in curvature.codes.iter().enumerate() {
+            // Of a spheroid with half axes of a, b, a: along its parallels and its meridians.
+            let p = 1000.0 * primitive.positions[vertex] * vec3(1.0, 2.0, 1.0);
+            let (a, b) = (10.0f32, 20.0f32);
+            let h = ((p.x * p.x + p.z * p.z) / a.powi(4) + p.y * p.y / b.powi(4)).sqrt();
+            let wanted = [1.0 / (a * a * h), 1.0 / (a * a * b * b * h.powi(3))];
+            let tensor = curvature_decode(code, curvature.range).0;
+            let (mean, half) = (0.5 * (tensor.xx + tensor.yy), 0.5 * (tensor.xx - tensor.yy));
+            let radius = (half * half + tensor.xy * tensor.xy).sqrt();
+            let (most, least) = (wanted[0].max(wanted[1]), wanted[0].min(wanted[1]));
+            let error = (mean + radius - most).abs().max((mean - radius - least).abs());
+            assert!(
+                error < 0.005,
+                "case {i} at {p}: wanted {wanted:?}, got {} and {}",
+                mean + radius,
+                mean - radius
+            );
+        }
+    }
+}
+
+#[test]
+fn one_curvature_for_several_sizes_is_taken_in_silence() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut document, binary) = Mesh::sphere(0.01).document();
+    document["scenes"][0]["nodes"] = json!([0, 1]);
+    for (scale, said, curvature) in [
+        (json!([3, 3, 3]), &["1.000 to 3.000", "--unit-mm", "largest"][..], 0.1 / 3.0),
+        (json!([1, 1, 1]), &[], 0.1),
+        (json!([1, 1, 1.001]), &[], 0.1),
+        (json!([1, 2, 0.5]), &["different ways"], 0.1),
+    ] {
+        document["nodes"] = json!([{ "mesh": 0 }, { "mesh": 0, "scale": scale }]);
+        let model = folder.path().join("two.glb");
+        write_glb(&model, document.clone(), binary.clone());
+        let out = folder.path().join("out");
+        let flags = ["--skin", "all", "--curvature-blur", "none", "--json"];
+        let report = done(&[&["--quiet", "bake", str(&model), "-o", str(&out)], &flags[..]].concat());
+        let report: Value = serde_json::from_str(&report).unwrap();
+        let warnings = report["warnings"].as_array().unwrap();
+        assert_eq!(warnings.len(), usize::from(!said.is_empty()), "{scale}: {warnings:?}");
+        for part in said {
+            assert!(warnings[0].as_str().unwrap().contains(part), "{scale}: {warnings:?}");
+        }
+        let scene = Scene::load(out.join("two.glb")).unwrap();
+        let baked = scene.primitives[0].curvature.as_ref().unwrap();
+        let mean = curvature_decode(baked.codes[2000], baked.range).1;
+        assert!((mean - curvature).abs() < 0.0015, "{scale}: wanted {curvature}, got {mean}");
+    }
+}
+
+#[test]
+fn borders_are_not_counted_where_nothing_is_blurred() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("dome.glb");
+    let dome = Mesh::grid(96, 24, |u, v| {
+        let (azimuth, polar) = (std::f32::consts::TAU * u, 0.5 * std::f32::consts::PI * v);
+        let ring = if v == 0.0 { 0.0 } else { polar.sin() };
+        let n = vec3(ring * azimuth.sin(), polar.cos(), ring * azimuth.cos());
+        (0.01 * n, n)
+    });
+    dome.write(&model);
+    for blur in ["none", "8,2.3"] {
+        let flags = ["--skin", "all", "--curvature-blur", blur, "--json"];
+        let out = folder.path().join("out");
+        let report = done(&[&["--quiet", "bake", str(&model), "-o", str(&out)], &flags[..]].concat());
+        let report: Value = serde_json::from_str(&report).unwrap();
+        assert_eq!(report["curvature"][0]["border_edges"], 96, "{blur}");
+    }
+}
+
 /// One half of a sphere mirrors the texture of the other: on the line between them MikkTSpace wants two tangents where
 /// the file has one vertex.
 #[test]

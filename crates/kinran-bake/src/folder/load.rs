@@ -49,7 +49,17 @@ pub struct LoadedMaterial {
 type AlphaLaw = fn(f32, f32) -> (f32, f32);
 
 /// Images already read, by path.
-type Images = BTreeMap<PathBuf, Arc<Image>>;
+pub(super) type Images = BTreeMap<PathBuf, Arc<Image>>;
+
+/// An image, read once.
+pub(super) fn read(images: &mut Images, path: &Path) -> Result<Arc<Image>, FolderError> {
+    if let Some(image) = images.get(path) {
+        return Ok(image.clone());
+    }
+    let image = Arc::new(read_image(path)?);
+    images.insert(path.into(), image.clone());
+    Ok(image)
+}
 
 impl MaterialMaps {
     /// Reads every map and checks that it holds what its name says. Maps may differ in size.
@@ -59,10 +69,20 @@ impl MaterialMaps {
     /// its unlabelled green clearly points down, or a direction or anisotropy map has not the channels it
     /// needs.
     pub fn load(&self) -> Result<LoadedMaterial, FolderError> {
+        let (mut images, mut notes) = (Images::new(), self.warnings.clone());
+        self.settled(&mut images, &mut notes)?.load_settled(images, notes)
+    }
+
+    /// Loads maps whose twins were compared; `known` are images that were read for that.
+    fn load_settled(&self, known: Images, mut notes: Vec<String>) -> Result<LoadedMaterial, FolderError> {
         let paths: BTreeSet<&PathBuf> = self.files.iter().map(|(_, path)| path).collect();
         let images: Images = (paths.into_par_iter())
-            .map(|path| Ok((path.clone(), Arc::new(read_image(path)?))))
+            .map(|path| {
+                let image = known.get(path).cloned().map_or_else(|| read_image(path).map(Arc::new), Ok)?;
+                Ok((path.clone(), image))
+            })
             .collect::<Result<_, FolderError>>()?;
+        drop(known);
         let loaded: Vec<LoadedMap> = (self.files.iter())
             .map(|(role, path)| LoadedMap { role: *role, path: path.clone(), image: images[path].clone() })
             .collect();
@@ -73,7 +93,6 @@ impl MaterialMaps {
             channel(&images, map)?;
         }
 
-        let mut notes = self.warnings.clone();
         let surface = match &self.roughness {
             None => None,
             Some(source) => {
@@ -138,7 +157,8 @@ fn normal_map(
         (false, GreenSource::Assumed) if guess == GreenGuess::Unsure => {
             notes.push(format!("{name}: assumed +Y; its slopes do not tell, say --y-down if it is DirectX"));
         }
-        (false, _) => {}
+        // Texels have the last word where they are asked.
+        (_, GreenSource::Texels) | (false, _) => {}
     }
     if let Some(lengths) = odd_lengths(image) {
         notes.push(match source.z {

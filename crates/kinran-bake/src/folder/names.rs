@@ -53,10 +53,14 @@ pub enum Role {
     Rma,
     /// Metallic, roughness, occlusion in red, green, blue.
     Mra,
+    /// Occlusion in red, roughness in green.
+    OcclusionRoughness,
     /// Roughness in green, metallic in blue (glTF).
     MetallicRoughness,
     /// Metallic in red, gloss in alpha (Unity).
     MetallicSmoothness,
+    /// Specular colour in red, green and blue, gloss in alpha (Unity, glTF's specular-glossiness).
+    SpecularSmoothness,
     /// Metallic in red, occlusion in green, gloss in alpha (Unity HDRP).
     MaskMap,
     /// Height, displacement or bump.
@@ -67,10 +71,12 @@ pub enum Role {
     Specular,
     /// Coverage.
     Opacity,
+    /// What a baker or a scan leaves beside the maps of a material: curvature, thickness, normals of the object.
+    Other,
 }
 
 /// Every role, its name in flags and tables, and which channels hold what.
-const ROLES: [(Role, &str, &str); 23] = [
+const ROLES: [(Role, &str, &str); 26] = [
     (Role::Normal, "normal", "RG normal"),
     (Role::Roughness, "roughness", "R roughness"),
     (Role::Gloss, "gloss", "R gloss"),
@@ -87,13 +93,16 @@ const ROLES: [(Role, &str, &str); 23] = [
     (Role::Orm, "orm", "R occlusion, G roughness, B metallic"),
     (Role::Rma, "rma", "R roughness, G metallic, B occlusion"),
     (Role::Mra, "mra", "R metallic, G roughness, B occlusion"),
+    (Role::OcclusionRoughness, "occlusion-roughness", "R occlusion, G roughness"),
     (Role::MetallicRoughness, "metallic-roughness", "G roughness, B metallic"),
     (Role::MetallicSmoothness, "metallic-smoothness", "R metallic, A gloss"),
+    (Role::SpecularSmoothness, "specular-smoothness", "A gloss"),
     (Role::MaskMap, "mask-map", "R metallic, G occlusion, A gloss"),
     (Role::Height, "height", "-"),
     (Role::Emissive, "emissive", "-"),
     (Role::Specular, "specular", "-"),
     (Role::Opacity, "opacity", "-"),
+    (Role::Other, "other", "-"),
 ];
 
 impl Role {
@@ -133,8 +142,10 @@ impl Role {
             Role::Orm => [Some(Occlusion), Some(Roughness), Some(Metallic), None],
             Role::Rma => [Some(Roughness), Some(Metallic), Some(Occlusion), None],
             Role::Mra => [Some(Metallic), Some(Roughness), Some(Occlusion), None],
+            Role::OcclusionRoughness => [Some(Occlusion), Some(Roughness), None, None],
             Role::MetallicRoughness => [None, Some(Roughness), Some(Metallic), None],
             Role::MetallicSmoothness => [Some(Metallic), None, None, Some(Gloss)],
+            Role::SpecularSmoothness => [None, None, None, Some(Gloss)],
             Role::MaskMap => [Some(Metallic), Some(Occlusion), None, Some(Gloss)],
             _ => [None; 4],
         };
@@ -167,14 +178,23 @@ pub(super) struct Name {
     pub(super) stem: String,
     /// The map.
     pub(super) role: Option<Role>,
+    /// Words behind the role that are neither a role's nor say how the file was saved; the name is read so only where
+    /// other files speak for it.
+    pub(super) tail: String,
     /// Which way green points, where the name tells.
     pub(super) green: Option<Green>,
     /// The role is one or two letters, which mean it only in company.
     pub(super) letter: bool,
     /// Begins with Unreal's `T_`.
     pub(super) unreal: bool,
-    /// `_spec` may mean gloss as well as the specular colour.
+    /// `_spec` may mean gloss as well as the specular colour, `_rough_ao` may hold either first.
     pub(super) unclear: bool,
+    /// Says that there are 16 bits.
+    pub(super) deep: bool,
+    /// The role is several words, the last of which is one by itself.
+    pub(super) joined: bool,
+    /// Ends in 1024, a side and the number of a UDIM tile.
+    pub(super) ends_in_1024: bool,
 }
 
 /// A run of letters and digits, at separators and inner capitals.
@@ -185,9 +205,13 @@ struct Piece<'a> {
     camel: bool,
 }
 
+fn digits(word: &str) -> bool {
+    !word.is_empty() && word.bytes().all(|b| b.is_ascii_digit())
+}
+
 /// Words that say how a file was saved, not what it holds.
 fn is_noise(word: &str) -> bool {
-    let number = |s: &str| !s.is_empty() && s.len() <= 5 && s.bytes().all(|b| b.is_ascii_digit());
+    let number = |s: &str| digits(s) && s.len() <= 5;
     let side = |s: &str| number(s) && s.parse::<u32>().is_ok_and(|n| n >= 128 && n.is_power_of_two());
     matches!(word, "png" | "jpg" | "jpeg" | "tga" | "tif" | "tiff" | "exr" | "hdr")
         || matches!(
@@ -200,9 +224,39 @@ fn is_noise(word: &str) -> bool {
         || word.split_once('x').is_some_and(|(w, h)| side(w) && side(h))
 }
 
-/// The role of a word in lower case without separators.
+/// Words that behind a role say which copy of a file it is, or in which colour space (Painter's `$colorSpace`).
+fn is_noise_behind(words: &[String], at: usize, in_brackets: bool) -> bool {
+    let word = words[at].as_str();
+    let before = if at > 0 { words[at - 1].as_str() } else { "" };
+    // u1_v1 is a tile (Mudbox).
+    let tile = |word: &str, letter| word.strip_prefix(letter).is_some_and(digits);
+    matches!(word, "final" | "copy" | "utility" | "acescg" | "aces" | "noncolor" | "rec709" | "output")
+        || (word == "709" && before == "rec")
+        || (word == "rec" && words.get(at + 1).is_some_and(|next| next == "709"))
+        || (matches!(word, "color" | "colour") && before == "non")
+        || (word == "non" && words.get(at + 1).is_some_and(|next| next.starts_with("colo")))
+        || (tile(word, 'v') && !tile(before, 'u'))
+        || word.strip_prefix("var").is_some_and(digits)
+        || (digits(word) && (in_brackets || before == "copy"))
+}
+
+/// Whether a word is the number of a UDIM tile.
+pub(super) fn is_udim(word: &str) -> bool {
+    word.len() == 4 && digits(word) && ("1001"..="1999").contains(&word)
+}
+
+/// Words that Poliigon puts behind the role of every file of a set.
+pub(super) const WORKFLOWS: [&str; 3] = ["metalness", "metallic", "specular"];
+
+/// The role of a word in lower case without separators, also with `map` or `16` behind it.
 fn role_of(word: &str) -> Option<(Role, Option<Green>)> {
-    let normal = ["normals", "normalmap", "normalbump", "normal", "norm", "nor", "nrml", "nrm"];
+    let shorter = || word.strip_suffix("16").or(word.strip_suffix("map")).and_then(role_of_word);
+    role_of_word(word).or_else(shorter)
+}
+
+fn role_of_word(word: &str) -> Option<(Role, Option<Green>)> {
+    let normal =
+        ["normals", "normalmap", "normalbump", "normal", "norm", "nor", "nrml", "nrm", "nml", "nmap"];
     for base in normal {
         match word.strip_prefix(base) {
             Some("") => return Some((Role::Normal, None)),
@@ -226,36 +280,59 @@ fn role_of(word: &str) -> Option<(Role, Option<Green>)> {
         "anisotropylevel" | "anisolevel" => Role::AnisotropyLevel,
         "anisotropy" => Role::Anisotropy,
         "aniso" => Role::Aniso,
-        "albedo" | "basecolor" | "basecolour" | "diffuse" | "diff" | "diffusecolor" | "color" | "colour"
-        | "col" => Role::Color,
+        "albedo"
+        | "basecolor"
+        | "basecolour"
+        | "diffuse"
+        | "diff"
+        | "diffusecolor"
+        | "color"
+        | "colour"
+        | "col"
+        | "basemap"
+        | "maintex"
+        | "albedotransparency"
+        | "diffusetransparency" => Role::Color,
         "ao" | "occlusion" | "ambientocclusion" | "mixedao" | "occ" => Role::Occlusion,
         "metallic" | "metalness" | "metal" => Role::Metallic,
         "orm"
         | "arm"
+        | "aorm"
         | "occlusionroughnessmetallic"
         | "occlusionroughnessmetalness"
         | "occlusionroughnessmetal" => Role::Orm,
-        "rma" => Role::Rma,
-        "mra" => Role::Mra,
+        "rma" | "rmao" | "rmo" => Role::Rma,
+        "mra" | "mrao" | "mro" => Role::Mra,
+        "ord" | "ordp" | "orh" | "roughao" | "roughnessao" | "aorough" | "aoroughness"
+        | "occlusionroughness" => Role::OcclusionRoughness,
         "metallicroughness" => Role::MetallicRoughness,
-        "metallicsmoothness" => Role::MetallicSmoothness,
+        "metallicsmoothness" | "metallicgloss" | "metallicglossiness" => Role::MetallicSmoothness,
+        "specularsmoothness" | "specularglossiness" | "specgloss" => Role::SpecularSmoothness,
         "maskmap" => Role::MaskMap,
-        "height" | "heightmap" | "disp" | "displacement" | "bump" => Role::Height,
-        "emissive" | "emission" => Role::Emissive,
-        "specular" | "specularlevel" | "specularcolor" | "specularcolour" | "spec" => Role::Specular,
+        "height" | "disp" | "displacement" | "bump" => Role::Height,
+        "emissive" | "emission" | "emit" => Role::Emissive,
+        "specular" | "specularlevel" | "specularcolor" | "specularcolour" | "spec" | "refl"
+        | "reflection" | "reflectivity" => Role::Specular,
         "opacity" | "mask" | "alpha" | "transparency" => Role::Opacity,
+        "cavity" | "curvature" | "thickness" | "position" | "id" | "translucency" | "transmission"
+        | "sss" | "subsurface" | "ior" | "worldspacenormal" | "worldspacenormals" | "worldnormal"
+        | "objectspacenormal" | "objectspacenormals" | "objectnormal" | "normalobject" | "normalobj"
+        | "normalsobject" | "normalsobj" | "bentnormal" | "bentnormals" | "clearcoat" | "clearcoatnormal"
+        | "clearcoatroughness" | "nra" | "nrao" => Role::Other,
         _ => return None,
     };
     Some((role, None))
 }
 
-/// The role of Unreal's one and two letters.
-fn role_of_letter(word: &str) -> Option<Role> {
+/// The role of Unreal's one and two letters; `a` and `b` are a colour only where the name begins as Unreal's do.
+fn role_of_letter(word: &str, unreal: bool) -> Option<Role> {
     Some(match word {
-        "n" => Role::Normal,
+        "n" | "nm" => Role::Normal,
         "r" => Role::Roughness,
         "d" | "bc" => Role::Color,
+        "a" | "b" if unreal => Role::Color,
         "m" => Role::Metallic,
+        "o" => Role::Occlusion,
         "h" => Role::Height,
         "e" => Role::Emissive,
         "s" => Role::Specular,
@@ -296,66 +373,154 @@ fn pieces(name: &str) -> Vec<Piece<'_>> {
     out
 }
 
-/// Takes a file name without its extension apart.
-pub(super) fn parse(name: &str) -> Name {
+/// Unknown words behind a role that a name may have; chosen by eye: `from Mesh`, `red oak`.
+const MOST_UNKNOWN: usize = 3;
+
+/// What a file name without its extension may mean, the likeliest first: the last role in it, and before that those with a
+/// `tail`. There is always one, without a role where nothing is known.
+pub(super) fn readings(name: &str) -> Vec<Name> {
+    if let Some(packed) = packed_by_parts(name) {
+        return vec![packed];
+    }
     let all = pieces(name);
     let unreal = name.starts_with("T_") || name.starts_with("t_");
     let lower: Vec<String> = all.iter().map(|p| p.text.to_lowercase()).collect();
-
-    let mut end = all.len();
-    let (begin, role, green, letter) = loop {
-        if end == 0 {
-            let whole = Name {
-                stem: name.to_owned(),
-                role: None,
-                green: None,
-                letter: false,
-                unreal,
-                unclear: false,
-            };
-            return whole;
-        }
-        // The longest name has four words: Normal Map Open GL. The longest match wins.
-        let found = (end.saturating_sub(4)..end).find_map(|begin| {
-            let (role, green) = role_of(&lower[begin..end].concat())?;
-            let word = &lower[begin];
-            let shouted = all[begin].text.chars().all(char::is_uppercase);
-            let camel_unsafe = word.len() <= 3 && !shouted || matches!(word.as_str(), "metal" | "mask");
-            let lonely = begin + 1 == end;
-            if all[begin].camel && lonely && camel_unsafe {
-                return None;
-            }
-            // "Metallic_Roughness" is the roughness of a material called Metallic, "x_metallic_roughness" is not.
-            let crosses = all[begin + 1..end].iter().any(|p| !p.camel);
-            if role.is_packed() && begin == 0 && crosses {
-                return None;
-            }
-            Some((begin, role, green, false))
-        });
-        let letter = || {
-            let begin = end - 1;
-            let role = role_of_letter(&lower[begin]).filter(|_| !all[begin].camel && begin > 0)?;
-            Some((begin, role, None, true))
-        };
-        if let Some(found) = found.or_else(letter) {
-            break found;
-        }
-        end = if is_noise(&lower[end - 1]) { end - 1 } else { 0 };
+    let in_brackets = |at: usize| name[..all[at].start].ends_with('(');
+    let nothing = Name {
+        stem: name.to_owned(),
+        role: None,
+        tail: String::new(),
+        green: None,
+        letter: false,
+        unreal,
+        unclear: false,
+        deep: false,
+        joined: false,
+        ends_in_1024: false,
     };
 
+    let mut found: Vec<Name> = Vec::new();
+    let (mut end, mut unknown, mut ends_in_1024) = (all.len(), 0, false);
+    // Pieces of the tail, the last first.
+    let mut tail: Vec<usize> = Vec::new();
+    while end > 0 && unknown <= MOST_UNKNOWN {
+        let word = &lower[end - 1];
+        if is_noise_behind(&lower, end - 1, in_brackets(end - 1)) {
+            end -= 1;
+            continue;
+        }
+        let plain = tail.iter().all(|&at| digits(&lower[at]));
+        let Some((begin, role, green, letter)) = role_at(&all, &lower, end, unreal && plain, plain) else {
+            if is_noise(word) {
+                ends_in_1024 |= word == "1024" && tail.is_empty();
+            } else {
+                tail.push(end - 1);
+                unknown += 1;
+            }
+            end -= 1;
+            continue;
+        };
+        let behind: Vec<&str> = tail.iter().rev().map(|&at| all[at].text).collect();
+        let reading = |begin: usize, role: Role, green: Option<Green>, letter: bool| Name {
+            stem: stem_before(name, &all, &lower, begin, unreal),
+            role: Some(role),
+            tail: behind.join("_"),
+            green,
+            letter,
+            unclear: lower[begin] == "spec"
+                || (role == Role::OcclusionRoughness && lower[begin].starts_with("rough")),
+            deep: lower[begin..end].iter().any(|word| word.ends_with("16")),
+            ends_in_1024,
+            ..nothing.clone()
+        };
+        let mut whole = reading(begin, role, green, letter);
+        // "x_rough_ao" holds both, or is the occlusion of a material called "x_rough".
+        let last = (begin + 1 < end && !all[end - 1].camel).then(|| role_of(&lower[end - 1])).flatten();
+        if let Some((last, green)) = last.filter(|_| role.is_packed()) {
+            whole.joined = true;
+            found.push(whole);
+            found.push(reading(end - 1, last, green, false));
+        } else {
+            found.push(whole);
+        }
+        tail.extend((begin..end).rev());
+        end = begin;
+    }
+    // A role of which nothing else is known comes first only if nothing stands behind it.
+    if found.first().is_none_or(|first| !first.tail.is_empty()) {
+        found.insert(0, nothing);
+    }
+    found
+}
+
+/// The role whose words end at piece `end`: where they begin, what it is, and whether it is a letter, which is asked for by
+/// `letters`.
+fn role_at(
+    all: &[Piece<'_>],
+    lower: &[String],
+    end: usize,
+    unreal: bool,
+    letters: bool,
+) -> Option<(usize, Role, Option<Green>, bool)> {
+    // The longest name has four words: Normal Map Open GL. The longest match wins.
+    let found = (end.saturating_sub(4)..end).find_map(|begin| {
+        let (role, green) = role_of(&lower[begin..end].concat())?;
+        let word = &lower[begin];
+        let shouted = all[begin].text.chars().all(char::is_uppercase);
+        let camel_unsafe = word.len() <= 3 && !shouted || matches!(word.as_str(), "metal" | "mask");
+        let lonely = begin + 1 == end;
+        if all[begin].camel && lonely && camel_unsafe {
+            return None;
+        }
+        // "Metallic_Roughness" is the roughness of a material called Metallic, "x_metallic_roughness" is not.
+        let crosses = all[begin + 1..end].iter().any(|p| !p.camel);
+        if (role.is_packed() || role == Role::Other) && begin == 0 && crosses {
+            return None;
+        }
+        Some((begin, role, green, false))
+    });
+    let letter = || {
+        let begin = end - 1;
+        let role = role_of_letter(&lower[begin], unreal)?;
+        (letters && !all[begin].camel && begin > 0).then_some((begin, role, None, true))
+    };
+    found.or_else(letter)
+}
+
+/// The material's name before a role that begins at piece `begin`.
+fn stem_before(name: &str, all: &[Piece<'_>], lower: &[String], begin: usize, unreal: bool) -> String {
     let mut last = begin;
     while last > 0 && is_noise(&lower[last - 1]) {
         last -= 1;
     }
     let first = usize::from(unreal && last > 0);
-    let stem = if last > first {
-        let piece = &all[last - 1];
-        name[all[first].start..piece.start + piece.text.len()].to_owned()
-    } else {
-        String::new()
+    if last <= first {
+        return String::new();
+    }
+    let piece = &all[last - 1];
+    name[all[first].start..piece.start + piece.text.len()].to_owned()
+}
+
+/// Blender's glTF exporter joins the names of what it packs: `wood_metallic-wood_roughness`, in glTF's channels.
+fn packed_by_parts(name: &str) -> Option<Name> {
+    if !name.contains('-') {
+        return None;
+    }
+    let parts: Vec<Name> = name.split('-').map(|part| readings(part).swap_remove(0)).collect();
+    let [first, _, ..] = parts.as_slice() else { return None };
+    let same = |part: &Name| part.stem.eq_ignore_ascii_case(&first.stem) && !part.letter;
+    if first.stem.is_empty() || !parts.iter().all(same) {
+        return None;
+    }
+    let mut roles: Vec<Role> = parts.iter().map(|part| part.role).collect::<Option<_>>()?;
+    roles.sort();
+    let role = match roles.as_slice() {
+        [Role::Roughness, Role::Metallic] => Role::MetallicRoughness,
+        [Role::Roughness, Role::Occlusion] => Role::OcclusionRoughness,
+        [Role::Roughness, Role::Occlusion, Role::Metallic] => Role::Orm,
+        _ => return None,
     };
-    let unclear = lower[begin] == "spec";
-    Name { stem, role: Some(role), green, letter, unreal, unclear }
+    Some(Name { role: Some(role), ..first.clone() })
 }
 
 #[cfg(test)]
@@ -448,7 +613,7 @@ mod tests {
             ("Fabric_ARM", "Fabric", Orm, None),
         ];
         for (name, stem, role, green) in cases {
-            let got = parse(name);
+            let got = readings(name).swap_remove(0);
             assert_eq!(
                 (got.stem.as_str(), got.role, got.green),
                 (*stem, Some(*role), *green),
@@ -472,7 +637,7 @@ mod tests {
             "n",
             "1k",
         ] {
-            let got = parse(name);
+            let got = readings(name).swap_remove(0);
             assert_eq!(got.role, None, "{name}: {got:?}");
             assert_eq!(got.stem, name);
         }

@@ -1,13 +1,13 @@
 //! Curvature of a glTF file's meshes, as a vertex attribute.
 
 use clap::ValueEnum;
-use glam::{Vec3, Vec4};
+use glam::{Mat3, Vec3, Vec4};
 use kinran_bake::curvature::{
     BLUR, Curvature, Mesh, Method, Options, Packed, bake_curvature, estimated_normals, principal,
     uniform_scale,
 };
 use kinran_image::{Channels, Image, Pixels, write_atomically, write_exr};
-use kinran_scene::{Attribute, Document, Maps, Needs, Pose, Primitive, Scene, Skin};
+use kinran_scene::{Attribute, Document, Instance, Maps, Needs, Pose, Primitive, Scene, Skin};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -303,7 +303,7 @@ pub(super) fn bake(
         let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
         let name = mesh_name(document, group[0].source.mesh);
         let at_fault = |reason: String| Error::Usage(format!("{}: {name}: {reason}", args.input.display()));
-        let surface = Joined::new(&group);
+        let surface = measured(scene, &mesh, &name, warnings);
         let millimetres = flags.unit_mm.map_or_else(|| unit(scene, &mesh, &name, warnings), f64::from);
         let options = Options {
             method: flags.curvature_method.into(),
@@ -368,7 +368,8 @@ fn largest(scene: &Scene, warnings: &mut Vec<String>, name: impl Fn(usize) -> St
         };
         let [size, other_size] = [&mesh, &*other].map(|mesh| sizes(scene, mesh).1);
         if size.max(other_size) > SAME_SIZE * size.min(other_size) {
-            warnings.push(several_sizes(&name(scene.primitives[mesh[0]].source.mesh)));
+            let name = name(scene.primitives[mesh[0]].source.mesh);
+            warnings.push(several_sizes(&name, size.min(other_size), size.max(other_size)));
         }
         if size > other_size {
             *other = mesh;
@@ -380,8 +381,11 @@ fn largest(scene: &Scene, warnings: &mut Vec<String>, name: impl Fn(usize) -> St
 /// Sizes whose ratio is below it are one; chosen by eye.
 const SAME_SIZE: f64 = 1.01;
 
-fn several_sizes(name: &str) -> String {
-    format!("{name} stands at several sizes; curvature is that of the largest, --unit-mm sets another")
+fn several_sizes(name: &str, smallest: f64, largest: f64) -> String {
+    format!(
+        "{name} stands at several sizes, {smallest:.3} to {largest:.3} times its own, and has one curvature: that of the \
+         largest; --unit-mm sets another"
+    )
 }
 
 /// Size in the scene over size in the document of a primitive.
@@ -389,16 +393,49 @@ pub(crate) fn pose_scale(primitive: &Primitive) -> f64 {
     primitive.source.pose.as_ref().map(|pose| pose.scale).filter(|scale| *scale > 0.0).unwrap_or(1.0)
 }
 
-/// The smallest and the largest size in the world over that in the document at which a mesh stands, and whether it is
-/// stretched anywhere; no size where it stands nowhere.
-fn sizes(scene: &Scene, mesh: &[usize]) -> (f64, f64, bool) {
+/// The smallest and the largest size in the world over that in the document at which a mesh stands; no size where it stands
+/// nowhere.
+fn sizes(scene: &Scene, mesh: &[usize]) -> (f64, f64) {
     let placed = scene.instances.iter().filter(|i| mesh.contains(&i.primitive));
-    placed.fold((f64::INFINITY, 0.0, false), |(smallest, largest, stretched), instance| {
-        let m = instance.transform.matrix3;
-        let (scale, uniform) = uniform_scale([m.x_axis.into(), m.y_axis.into(), m.z_axis.into()]);
-        let scale = scale * pose_scale(&scene.primitives[instance.primitive]);
-        (smallest.min(scale), largest.max(scale), stretched || !uniform)
+    placed.fold((f64::INFINITY, 0.0), |(smallest, largest), instance| {
+        let scale = uniform_scale(columns(instance)).0 * pose_scale(&scene.primitives[instance.primitive]);
+        (smallest.min(scale), largest.max(scale))
     })
+}
+
+fn columns(instance: &Instance) -> [Vec3; 3] {
+    let m = instance.transform.matrix3;
+    [m.x_axis.into(), m.y_axis.into(), m.z_axis.into()]
+}
+
+/// How nodes stretch a mesh.
+pub(crate) enum Stretch {
+    /// Not at all.
+    None,
+    /// All in one way: this, without its size.
+    Same(Mat3),
+    /// Some more than others.
+    Different,
+}
+
+/// How the nodes at which a mesh stands stretch it. What they turn makes no difference to a curvature.
+pub(crate) fn stretch(scene: &Scene, mesh: &[usize]) -> Stretch {
+    let mut shapes = scene.instances.iter().filter(|i| mesh.contains(&i.primitive)).map(|instance| {
+        let columns = columns(instance);
+        let (scale, uniform) = uniform_scale(columns);
+        let matrix = Mat3::from_cols(columns[0], columns[1], columns[2]) * (1.0 / scale as f32);
+        (matrix, uniform)
+    });
+    let Some((first, uniform)) = shapes.next() else { return Stretch::None };
+    let metric = first.transpose() * first;
+    // In a square, twice what makes sizes one.
+    let tolerance = 2.0 * (SAME_SIZE - 1.0) as f32;
+    let same = |(other, _): (Mat3, bool)| (other.transpose() * other).abs_diff_eq(metric, tolerance);
+    match (shapes.all(same), uniform) {
+        (true, true) => Stretch::None,
+        (true, false) if first.is_finite() => Stretch::Same(first),
+        _ => Stretch::Different,
+    }
 }
 
 /// Primitives as one surface.
@@ -430,18 +467,44 @@ impl Joined {
         }
         joined
     }
+
+    /// The surface as a node stretches it. Tensors are still those of the mesh's own tangents, which the node takes along.
+    pub(crate) fn stretched(mut self, by: Mat3) -> Self {
+        let of_normals = by.inverse().transpose();
+        let turned = by.determinant().signum();
+        self.positions.iter_mut().for_each(|p| *p = by * *p);
+        self.normals.iter_mut().for_each(|n| *n = (of_normals * *n).normalize_or(*n));
+        for tangent in &mut self.tangents {
+            *tangent = (by * tangent.truncate()).normalize_or(Vec3::X).extend(tangent.w * turned);
+        }
+        if turned < 0.0 {
+            self.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        }
+        self
+    }
+}
+
+/// Primitives as the surface that is measured, stretched where their nodes do that.
+pub(crate) fn measured(scene: &Scene, mesh: &[usize], name: &str, warnings: &mut Vec<String>) -> Joined {
+    let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
+    let surface = Joined::new(&group);
+    match stretch(scene, mesh) {
+        Stretch::None => surface,
+        Stretch::Same(by) => surface.stretched(by),
+        Stretch::Different => {
+            warnings.push(format!(
+                "{name} is stretched in different ways by its nodes and has one curvature: that of the mesh as it is"
+            ));
+            surface
+        }
+    }
 }
 
 /// Millimetres in the unit of the document's mesh: a metre times the scale of where it stands.
 pub(crate) fn unit(scene: &Scene, mesh: &[usize], name: &str, warnings: &mut Vec<String>) -> f64 {
-    let (smallest, largest, stretched) = sizes(scene, mesh);
-    if stretched {
-        warnings.push(format!(
-            "{name} is stretched by its node; curvature is that of the mesh, not of its picture"
-        ));
-    }
+    let (smallest, largest) = sizes(scene, mesh);
     if largest > SAME_SIZE * smallest {
-        warnings.push(several_sizes(name));
+        warnings.push(several_sizes(name, smallest, largest));
     }
     1000.0 * if largest > 0.0 { largest } else { 1.0 }
 }

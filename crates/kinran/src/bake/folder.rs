@@ -30,7 +30,10 @@ pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
     let mut report = Report::new(args);
     let names = folder.materials.iter().map(|material| material.name.clone());
     report.surfaces = names.map(SurfaceReport::new).collect();
-    report.warnings = folder.materials.iter().flat_map(|material| material.warnings.clone()).collect();
+    for material in &folder.materials {
+        report.warnings.extend(material.warnings.clone());
+        report.warnings.extend(material.compare_twins()?);
+    }
     report.warnings.iter().for_each(|warning| console.warn(warning));
     let text = folder.table();
     console.result(&BakeReport::new(args, folder.rows, vec![report]), &text)

@@ -6,8 +6,8 @@ use kinran_bake::aniso::{RoughnessMaps, Sheet, SheetRequest, bake_surface};
 use kinran_bake::folder::{Green, GreenGuess, guess_green, odd_lengths};
 use kinran_bake::{MaterialSurface, NoSurface, bake_plain, material_surface};
 use kinran_image::{
-    Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Role, Texture, Transfer, full_level_count,
-    level_size, write_png,
+    Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Role, Texture, Transfer, decode_image,
+    full_level_count, level_size, write_png,
 };
 use kinran_scene::{
     Document, FUZZ_EXTENSION, Maps, Material, Needs, Scene, Slot, TextureExtension, TextureRef,
@@ -25,7 +25,8 @@ use crate::{Console, Error};
 
 /// Bakes a glTF file and tells what came of it.
 pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    let report = bake_gltf(args, console)?;
+    let mut report = bake_gltf(args, console)?;
+    report.warnings.extend(args.idle_curvature().filter(|_| report.curvature.is_empty()));
     for warning in &report.warnings {
         console.warn(warning);
     }
@@ -34,7 +35,7 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     console.result(&BakeReport::new(args, Vec::new(), vec![report]), &text)
 }
 
-/// Bakes every material of a glTF file that has a normal or an anisotropy map.
+/// Bakes every material of a glTF file that has a normal, a roughness or an anisotropy map.
 ///
 /// Each baked texture keeps a PNG or JPEG of level 0 as the fallback that glTF wants: the original image, or,
 /// where a factor was baked in, a new one.
@@ -65,6 +66,9 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
         let (document, name, written) = (&mut document, name.clone(), &mut written);
         let mut baker = SurfaceBaker { args, console, scene: &scene, document, name, written };
         report.surfaces.push(baker.bake(materials, surface, planned)?);
+    }
+    for turned in &plan.turned {
+        turn_green(args, &mut document, turned, &mut written)?;
     }
     let colors = console.progress().busy("colour, emission, occlusion");
     bake_colors(args, &scene, &mut document, &plan.colors, &mut report)?;
@@ -98,6 +102,17 @@ struct Plan {
     /// What the files of each surface are called, and which they are.
     surfaces: Vec<(String, Vec<Planned>)>,
     colors: Vec<Colored>,
+    turned: Vec<Turned>,
+}
+
+/// A normal map that is not filtered, and whose green `--y-down` turns over.
+struct Turned {
+    /// The new file.
+    file: String,
+    texture: usize,
+    image: usize,
+    /// The materials that use it, and where.
+    slots: Vec<(usize, Slot)>,
 }
 
 /// An image that needs no filter of its own.
@@ -129,11 +144,11 @@ impl Plan {
         args: &Args,
         scene: &Scene,
         document: &Document,
-        surfaces: &[(Key, Vec<usize>, MaterialSurface)],
+        all: &[(Key, Vec<usize>, MaterialSurface)],
         stem: &str,
     ) -> Self {
         let mut names = Names::default();
-        let surfaces = surfaces.iter().map(|(_, materials, surface)| {
+        let surfaces = all.iter().map(|(_, materials, surface)| {
             let material = &scene.materials[materials[0]];
             (
                 names.unique(&format!("{stem}_{}", file_stem(&material.name))),
@@ -169,8 +184,61 @@ impl Plan {
                 }
             }
         }
-        Plan { surfaces, colors }
+        let baked: Vec<usize> = all.iter().flat_map(|(_, materials, _)| materials.clone()).collect();
+        let mut turned: Vec<Turned> = Vec::new();
+        for material in (0..materials).filter(|_| args.y_down) {
+            // The maps of a surface are turned while they are filtered.
+            let slots = [Slot::Normal, Slot::ClearcoatNormal].into_iter();
+            for slot in slots.filter(|slot| *slot != Slot::Normal || !baked.contains(&material)) {
+                let Some(texture) = document.texture(material, slot) else { continue };
+                let Some(image) = document.texture_image(texture) else { continue };
+                if let Some(known) = turned.iter_mut().find(|known| known.texture == texture) {
+                    known.slots.push((material, slot));
+                    continue;
+                }
+                let name = names.unique(&format!("{stem}_{}_up", file_stem(&document.image_name(image))));
+                turned.push(Turned {
+                    file: format!("{name}.png"),
+                    texture,
+                    image,
+                    slots: vec![(material, slot)],
+                });
+            }
+        }
+        Plan { surfaces, colors, turned }
     }
+}
+
+/// Writes a normal map with its green turned over and puts it into its slots.
+fn turn_green(
+    args: &Args,
+    document: &mut Document,
+    turned: &Turned,
+    written: &mut Vec<WrittenFile>,
+) -> Result<(), Error> {
+    let name = document.image_name(turned.image);
+    let bytes = document.image_bytes(turned.image)?.into_owned();
+    let mut image = decode_image(Path::new(&name), &bytes).map_err(|e| {
+        Error::file_error(&args.input, format!("its normal map cannot be turned as --y-down says: {e}"))
+    })?;
+    let count = image.channels.count();
+    fn turn<T: Copy>(samples: &mut [T], count: usize, over: impl Fn(T) -> T) {
+        samples.iter_mut().skip(1).step_by(count).for_each(|green| *green = over(*green));
+    }
+    match &mut image.pixels {
+        _ if image.channels < Channels::Rgb => {}
+        Pixels::U8(samples) => turn(samples, count, |g| 255 - g),
+        Pixels::U16(samples) => turn(samples, count, |g| 65535 - g),
+        Pixels::F32(samples) => turn(samples, count, |g| 1.0 - g),
+    }
+    write_png(&args.output().join(&turned.file), &image)?;
+    written.push(WrittenFile::of(args.output(), &turned.file)?);
+    let source = document.add_image_file(&turned.file);
+    let texture = document.add_texture(Some(turned.texture), Some(source), &[]);
+    for &(material, slot) in &turned.slots {
+        document.set_texture(material, slot, texture);
+    }
+    Ok(())
 }
 
 /// The sheets of a material's surface.
@@ -232,6 +300,7 @@ fn check(
             space.add(texture_space(args, color.encoding(args).format, (image.width, image.height)));
         }
     }
+    files.extend(plan.turned.iter().map(|turned| turned.file.clone()));
     for file in &files {
         refuse_authored(document, &args.output().join(file))?;
     }
@@ -310,7 +379,7 @@ fn surfaces(
     let skin = scene.primitives.iter().any(|p| args.curvature.wants(scene, p));
     if !apart && surfaces.is_empty() && !args.all_textures && !skin {
         report.warnings.push(format!(
-            "{}: no material has a normal or an anisotropy map; nothing but --all-textures would bake anything",
+            "{}: no material has a normal, a roughness or an anisotropy map; nothing but --all-textures would bake anything",
             file_name(&args.input)
         ));
     }
@@ -690,6 +759,8 @@ pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
         let inputs = inputs(&scene, &document, materials[0])?;
         report.surfaces.push(SurfaceReport { inputs, ..SurfaceReport::new(names[0].to_owned()) });
     }
+    let measured = scene.primitives.iter().any(|p| args.curvature.wants(&scene, p));
+    report.warnings.extend(args.idle_curvature().filter(|_| !measured));
     for warning in &report.warnings {
         console.warn(warning);
     }

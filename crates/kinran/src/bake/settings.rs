@@ -6,19 +6,17 @@ use clap::{ArgAction, CommandFactory, Parser};
 use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError, Setting, SettingValue};
 use kinran_image::{Encoding, Role};
 
-use super::{Args, FOLDER_FLAGS};
+use super::Args;
+use super::flags::Flag;
 use crate::Error;
 use crate::detail::{BlockFormat, SolveArgs, default_format};
 use crate::skin_lut;
 
-/// Flags that say what a run does, not how an entry is baked.
-const OF_THE_RUN: [&str; 8] = ["output", "watch", "jobs", "prune", "cache", "dry-run", "force", "help"];
-
 #[derive(Parser)]
 #[command(name = "bake", no_binary_name = true)]
-struct BakeFlags {
+pub(super) struct BakeFlags {
     #[command(flatten)]
-    args: Args,
+    pub(super) args: Args,
 }
 
 #[derive(Parser)]
@@ -85,22 +83,21 @@ impl Flags {
 
 /// Refuses flags that a manifest sets for its entries.
 pub(super) fn refuse_others(args: &Args) -> Result<(), Error> {
-    let bare = BakeFlags::try_parse_from(["x"]).map_err(|e| Error::Internal(e.to_string()))?.args;
-    let of_the_run = Args {
-        input: args.input.clone(),
-        output: args.output.clone(),
-        library: args.library.clone(),
-        dry_run: args.dry_run,
-        ..bare
-    };
-    if *args != of_the_run {
-        return Err(Error::Usage(format!(
-            "{}: how entries are baked stands in the manifest; move these flags to its [defaults], without \
-             their dashes",
-            args.input.display()
-        )));
+    let of_entries = super::flags::FLAGS.iter().find(|flag| flag.is_of_entries() && (flag.given)(args));
+    match of_entries {
+        None => Ok(()),
+        Some(flag) => Err(Error::Usage(format!(
+            "{}: --{} says how entries are baked, which stands in the manifest; move these flags to its [defaults], \
+             without their dashes",
+            args.input.display(),
+            flag.name
+        ))),
     }
-    Ok(())
+}
+
+/// Whether a flag says what a run does, not how an entry is baked.
+fn is_of_the_run(name: &str) -> bool {
+    Flag::named(name).is_some_and(|flag| !flag.is_of_entries())
 }
 
 /// The flags of a job.
@@ -187,7 +184,7 @@ fn words(manifest: &Manifest, kind: Kind, setting: &Setting) -> Result<Vec<Strin
     let name = &setting.name;
     let find = |command: &clap::Command| {
         let known = command.get_arguments().find(|a| a.get_long() == Some(name)).cloned();
-        known.filter(|_| !OF_THE_RUN.contains(&name.as_str()))
+        known.filter(|_| !is_of_the_run(name))
     };
     let Some(argument) = find(&command) else {
         let others = [Kind::Aniso, Kind::Detail, Kind::Skin].into_iter().filter(|other| *other != kind);
@@ -196,12 +193,16 @@ fn words(manifest: &Manifest, kind: Kind, setting: &Setting) -> Result<Vec<Strin
         }
         return Err(manifest.error(&setting.place, unknown(&command, name)));
     };
-    if kind == Kind::Mesh && FOLDER_FLAGS.contains(&name.as_str()) {
+    let idle = match kind {
+        Kind::Aniso => Flag::named(name).filter(|flag| !flag.on.acts(false)),
+        Kind::Mesh => Flag::named(name).filter(|flag| !flag.on.acts(true)),
+        Kind::Detail | Kind::Skin => None,
+    };
+    if let Some(flag) = idle {
         if setting.is_default {
             return Ok(Vec::new());
         }
-        let reason =
-            format!("`{name}` is about folders of maps, and a glTF file says it itself; leave it out");
+        let reason = format!("`{name}` {}; leave it out", flag.refusal());
         return Err(manifest.error(&setting.place, reason));
     }
     let is_switch = matches!(argument.get_action(), ArgAction::SetTrue);
@@ -234,14 +235,11 @@ fn words(manifest: &Manifest, kind: Kind, setting: &Setting) -> Result<Vec<Strin
 
 /// What to say of a name that is no flag.
 fn unknown(command: &clap::Command, name: &str) -> String {
-    if OF_THE_RUN.contains(&name) {
+    if is_of_the_run(name) {
         return format!("`{name}` says what a run does; give it on the command line as --{name}");
     }
-    let mut names: Vec<&str> = command
-        .get_arguments()
-        .filter_map(clap::Arg::get_long)
-        .filter(|long| !OF_THE_RUN.contains(long))
-        .collect();
+    let mut names: Vec<&str> =
+        command.get_arguments().filter_map(clap::Arg::get_long).filter(|long| !is_of_the_run(long)).collect();
     names.sort_unstable();
     format!("unknown key `{name}`; expected input, exclude, output, or a flag: {}", names.join(", "))
 }

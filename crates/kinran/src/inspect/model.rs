@@ -156,13 +156,15 @@ fn bake(scene: &Scene, material: usize) -> String {
         Ok(surface) if surface.place.is_none() => "nothing: its anisotropy is in factors alone".into(),
         Ok(surface) => {
             let (width, height) = surface.maps.size();
-            let what = match surface.maps.roughness {
-                RoughnessMaps::Isotropic(_) => "normal and roughness",
-                _ => "normal and anisotropy",
+            let what = match (&surface.maps.normal.image, &surface.maps.roughness) {
+                (None, RoughnessMaps::Isotropic(_)) => "roughness",
+                (Some(_), RoughnessMaps::Isotropic(_)) => "normal and roughness",
+                (None, _) => "roughness and anisotropy",
+                (Some(_), _) => "normal and anisotropy",
             };
             format!("{what}, {width}x{height}, {} levels", full_level_count(width, height))
         }
-        Err(NoSurface::Plain) => "nothing: it has no normal map and is isotropic".into(),
+        Err(NoSurface::Plain) => "nothing: it has no normal or roughness map and is isotropic".into(),
         Err(NoSurface::Apart(reason)) => format!("nothing: {reason}"),
     }
 }

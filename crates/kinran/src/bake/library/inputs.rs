@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
 use kinran_bake::cache::{Key, WorkFolder, hash_file};
-use kinran_bake::folder::scan;
+use kinran_bake::folder::{inner_folder, scan};
 use kinran_bake::manifest::{Job, Kind, SettingValue};
 use kinran_bake::stamps::Stamp;
 use kinran_image::{Encoder, Encoding};
@@ -19,7 +19,7 @@ use crate::Error;
 
 /// Part of every key. To be raised whenever the same version bakes other bytes from the same files and flags; a test
 /// holds the bytes of a small library against it (`tests/library.rs`).
-const BYTES_VERSION: u32 = 3;
+const BYTES_VERSION: u32 = 4;
 
 /// How often a file that is being written is looked at again, waiting twice as long each time: 1.3 s in all.
 const LOOKS: u32 = 8;
@@ -60,9 +60,13 @@ impl Sources {
             Flags::Bake(_) if job.kind == Kind::Mesh => add_model(&job.input)?,
             Flags::Bake(flags) => {
                 let folder = scan(&job.input, &flags.hints())?;
-                words.push(serde_json::to_string(&folder.rows).map_err(|e| Error::Internal(e.to_string()))?);
-                for (role, path) in folder.materials.into_iter().flat_map(|material| material.files) {
-                    files.push((format!("{} {}", role.name(), file_name(&path)), path));
+                let rows: Vec<_> = folder.rows.iter().filter(|row| row.is_picture()).collect();
+                words.push(serde_json::to_string(&rows).map_err(|e| Error::Internal(e.to_string()))?);
+                for material in folder.materials {
+                    let twins = material.twins.into_iter().map(|twin| (twin.other_role, twin.other));
+                    for (role, path) in material.files.into_iter().chain(twins) {
+                        files.push((format!("{} {}", role.name(), file_name(&path)), path));
+                    }
                 }
             }
             Flags::Detail(flags) => {
@@ -272,9 +276,12 @@ impl Copies {
         Ok(place)
     }
 
-    /// Copies the names of the files in a folder: what is understood of a folder is understood by names. Those that are
-    /// used are copied later.
+    /// Copies the names of the files in a folder, and in the one in it that has its maps: what is understood of a folder is
+    /// understood by names. Those that are used are copied later.
     fn copy_names(&mut self, folder: &Path) -> Result<PathBuf, Error> {
+        if let Some(inner) = inner_folder(folder) {
+            self.copy_names(&inner)?;
+        }
         let place = self.place(folder)?;
         let fail = |e| kinran_image::Error::io(folder, e);
         fs::create_dir_all(&place).map_err(fail)?;

@@ -1,0 +1,139 @@
+//! What the names of a folder's files say together: one word common to a whole set is no role, and words behind a role
+//! name a variant or a tile.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::names::{Name, WORKFLOWS, is_udim};
+use super::{Found, Role, add_note};
+
+/// As many roles under one stem and one tail are a set, and as many make a word that could be a role none; chosen by eye.
+const SET: usize = 2;
+const SET_OF_A_ROLE: usize = 3;
+
+/// Chooses among the readings of each file's name by those of the others.
+pub(super) fn settle(found: &mut [Found]) {
+    let sets = Sets::of(found);
+    for i in 0..found.len() {
+        let first = &found[i].readings[0];
+        let chosen = match first.role {
+            None => found[i].readings[1..].iter().find(|name| sets.accepts_unknown(name)),
+            Some(_) if first.joined => found[i].readings.get(1).filter(|name| sets.has_whole(&name.stem, i)),
+            Some(_) => found[i].readings[1..].iter().find(|name| sets.accepts_role(name)),
+        };
+        if let Some(chosen) = chosen.cloned() {
+            let file = &mut found[i];
+            if is_tile(&chosen.tail) {
+                add_note(&mut file.note, &format!("tile {}", chosen.tail));
+            } else if first_has_role(file) && !chosen.tail.is_empty() {
+                add_note(&mut file.note, &format!("{} stands in every name of the set", chosen.tail));
+            }
+            file.role = chosen.role;
+            file.name = Name { stem: sets.stem(&chosen), ..chosen };
+        } else if first.role.is_some() && first.ends_in_1024 && sets.has_tiles(&first.stem) {
+            let file = &mut found[i];
+            file.name.stem += "_1024";
+            add_note(&mut file.note, "tile 1024");
+        } else if first.role.is_none()
+            && let Some(near) = found[i].readings.get(1).filter(|name| sets.has_whole(&name.stem, i))
+            && let Some(role) = near.role.filter(|role| role.is_used())
+        {
+            let tail = near.tail.clone();
+            found[i].note = format!(
+                "{tail} behind the {role} is not understood; --map {role}={} takes it for one",
+                found[i].file
+            );
+        }
+    }
+}
+
+fn first_has_role(file: &Found) -> bool {
+    file.readings[0].role.is_some()
+}
+
+/// Whether words behind a role are the number of a tile, as UDIM or as `u1_v1`.
+fn is_tile(tail: &str) -> bool {
+    let part = |part: &str, letter: char| {
+        part.to_lowercase()
+            .strip_prefix(letter)
+            .is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    };
+    is_udim(tail) || tail.split_once('_').is_some_and(|(u, v)| part(u, 'u') && part(v, 'v'))
+}
+
+/// All readings with a role.
+struct Sets {
+    /// Roles by stem and tail, in lower case.
+    roles: BTreeMap<(String, String), BTreeSet<Role>>,
+    /// Stems of names that nothing stands behind, by file.
+    whole: Vec<Option<String>>,
+    /// Tails by stem, those of each file; empty ones too.
+    tails: BTreeMap<String, Vec<String>>,
+}
+
+impl Sets {
+    fn of(found: &[Found]) -> Self {
+        let mut sets = Sets { roles: BTreeMap::new(), whole: Vec::new(), tails: BTreeMap::new() };
+        for file in found {
+            let first = &file.readings[0];
+            sets.whole.push(first.role.map(|_| first.stem.to_lowercase()));
+            let mut of_file: BTreeMap<String, String> = BTreeMap::new();
+            for name in file.readings.iter().filter(|name| !(name.joined && file.readings.len() > 1)) {
+                let Some(role) = name.role else { continue };
+                let key = (name.stem.to_lowercase(), name.tail.to_lowercase());
+                sets.roles.entry(key.clone()).or_default().insert(role);
+                of_file.entry(key.0).or_insert(key.1);
+            }
+            for (stem, tail) in of_file {
+                sets.tails.entry(stem).or_default().push(tail);
+            }
+        }
+        sets
+    }
+
+    fn roles(&self, stem: &str, tail: &str) -> usize {
+        self.roles.get(&(stem.to_lowercase(), tail.to_lowercase())).map_or(0, BTreeSet::len)
+    }
+
+    /// Whether another file than `but` has this stem with nothing behind its role.
+    fn has_whole(&self, stem: &str, but: usize) -> bool {
+        let stem = stem.to_lowercase();
+        self.whole.iter().enumerate().any(|(i, whole)| i != but && whole.as_ref() == Some(&stem))
+    }
+
+    fn has_tiles(&self, stem: &str) -> bool {
+        self.tails.get(&stem.to_lowercase()).is_some_and(|tails| tails.iter().any(|tail| is_tile(tail)))
+    }
+
+    /// Whether a name without a role at its end may be read with a tail.
+    fn accepts_unknown(&self, name: &Name) -> bool {
+        is_tile(&name.tail) || self.roles(&name.stem, &name.tail) >= SET
+    }
+
+    /// Whether what looks like a role at a name's end is a word of the whole set: every file of the set has it, or one of
+    /// the words that Poliigon calls its workflows by.
+    fn accepts_role(&self, name: &Name) -> bool {
+        let Some(tails) = self.tails.get(&name.stem.to_lowercase()).filter(|_| !name.stem.is_empty()) else {
+            return false;
+        };
+        let different: BTreeSet<&String> = tails.iter().collect();
+        let workflows = different.iter().all(|tail| WORKFLOWS.contains(&tail.as_str()));
+        let roles = |tail: &str| self.roles(&name.stem, tail);
+        if workflows {
+            different.iter().all(|tail| roles(tail) >= SET)
+        } else {
+            different.len() == 1 && !name.tail.is_empty() && roles(&name.tail) >= SET_OF_A_ROLE
+        }
+    }
+
+    /// The material's name: with the tail, unless all files have the same.
+    fn stem(&self, name: &Name) -> String {
+        let tails = self.tails.get(&name.stem.to_lowercase());
+        let common = tails.is_some_and(|tails| tails.iter().all(|tail| name.tail.eq_ignore_ascii_case(tail)));
+        match (name.stem.as_str(), common && !is_tile(&name.tail)) {
+            (stem, _) if name.tail.is_empty() => stem.to_owned(),
+            ("", _) => name.tail.clone(),
+            (stem, true) => stem.to_owned(),
+            (stem, false) => format!("{stem}_{}", name.tail),
+        }
+    }
+}
