@@ -567,8 +567,28 @@ fn list_one(folder: &Path, prefix: &str) -> Result<Listing, FolderError> {
     listing.found.sort_by(|a, b| a.path.cmp(&b.path));
     listing.others.sort();
     listing.folders.sort();
+    leave_out_baked(&mut listing);
     sets::settle(&mut listing.found);
     Ok(listing)
+}
+
+/// Leaves out what was baked into the folder itself: textures beside the report of their material.
+fn leave_out_baked(listing: &mut Listing) {
+    let reports: Vec<String> = listing
+        .others
+        .iter()
+        .filter_map(|file| Some(file.strip_suffix(".kinran.json")?.to_lowercase()))
+        .collect();
+    for file in listing.found.iter_mut().filter(|file| is_one_of(&file.path, &["ktx2", "dds"])) {
+        let name = file.file.to_lowercase();
+        let of =
+            |report: &String| name.strip_prefix(report.as_str()).is_some_and(|rest| rest.starts_with('_'));
+        if reports.iter().any(of) {
+            let nothing = names::Name { role: None, ..file.name.clone() };
+            (file.role, file.readings, file.name) = (None, vec![nothing.clone()], nothing);
+            file.dropped = Some("baked by kinran".into());
+        }
+    }
 }
 
 /// The image files of a folder that a name tells the role of, by name, with the way green points where the name says

@@ -342,7 +342,10 @@ impl Found {
             if maps.iter().all(|(path, ..)| of_model(path)) {
                 continue;
             }
-            match scan(&full, &Hints::default()) {
+            let understood = scan(&full, &Hints::default()).and_then(|found| {
+                found.materials.iter().try_for_each(|material| material.compare_twins().map(drop))
+            });
+            match understood {
                 Ok(_) if folder == Path::new("") => {
                     let bake = format!("kinran bake {}", root.display());
                     self.leave_out(&folder, format!("the folder itself holds maps; `{bake}` bakes them"));

@@ -481,6 +481,25 @@ fn flags_about_folders_are_swallowed_by_models() {
     }
 }
 
+/// Baked into the folder of its maps, a material is not made from its own textures the next time.
+#[test]
+fn a_folder_is_baked_from_what_was_baked_into_it() {
+    let input = cloth(32);
+    let bake = || {
+        let flags = ["--container", "both"];
+        kinran_json(&[&["bake", text(input.path()), "-o", text(input.path())], &flags[..]].concat())
+    };
+    let (first, second) = (bake(), bake());
+    assert_eq!(first["surfaces"], second["surfaces"]);
+    let note = |file: &str| {
+        let rows = second["files"].as_array().unwrap();
+        rows.iter().find(|row| row["file"] == file).unwrap()["note"].as_str().unwrap().to_owned()
+    };
+    for file in ["cloth_normal.ktx2", "cloth_aniso.dds", "cloth_color.ktx2"] {
+        assert_eq!(note(file), "not used: baked by kinran", "{file}");
+    }
+}
+
 /// What is about meshes and materials is nothing that can be done to a folder of maps.
 #[test]
 fn flags_about_models_are_swallowed_by_folders() {

@@ -228,13 +228,12 @@ fn is_noise(word: &str) -> bool {
 fn is_noise_behind(words: &[String], at: usize, in_brackets: bool) -> bool {
     let word = words[at].as_str();
     let before = if at > 0 { words[at - 1].as_str() } else { "" };
+    let after = words.get(at + 1).map_or("", String::as_str);
+    const PAIRS: [(&str, &str); 4] = [("non", "color"), ("non", "colour"), ("rec", "709"), ("ace", "scg")];
     // u1_v1 is a tile (Mudbox).
     let tile = |word: &str, letter| word.strip_prefix(letter).is_some_and(digits);
     matches!(word, "final" | "copy" | "utility" | "acescg" | "aces" | "noncolor" | "rec709" | "output")
-        || (word == "709" && before == "rec")
-        || (word == "rec" && words.get(at + 1).is_some_and(|next| next == "709"))
-        || (matches!(word, "color" | "colour") && before == "non")
-        || (word == "non" && words.get(at + 1).is_some_and(|next| next.starts_with("colo")))
+        || PAIRS.iter().any(|pair| *pair == (before, word) || *pair == (word, after))
         || (tile(word, 'v') && !tile(before, 'u'))
         || word.strip_prefix("var").is_some_and(digits)
         || (digits(word) && (in_brackets || before == "copy"))
