@@ -193,45 +193,67 @@ pub(super) fn apart(a: &Image, b: &Image, channels: usize, is_opposite: bool) ->
     if (a.width, a.height) != (b.width, b.height) {
         return None;
     }
+    let is_normal = channels == 0;
     let signed = [a, b].map(is_signed);
+    let value = |sample: f32, signed: bool| match is_normal {
+        true => 0.5 * component(sample, signed),
+        false => f64::from(sample),
+    };
+    let used = if is_normal { 2 } else { channels };
     let rows = in_rows(a, 0..a.height, |y| {
         let (mut of_a, mut of_b) = (Vec::new(), Vec::new());
         a.row_rgba_f32(y, &mut of_a);
         b.row_rgba_f32(y, &mut of_b);
-        // Squares of differences, with green turned over; sums and squares of the first.
-        let mut sums = [0.0f64; 2];
-        let mut moments = [[0.0f64; 2]; 3];
+        let mut row = Sums::default();
         for (ta, tb) in of_a.iter().zip(&of_b) {
-            for c in 0..if channels == 0 { 2 } else { channels } {
-                let (x, mut y) = match channels {
-                    0 => (0.5 * component(ta[c], signed[0]), 0.5 * component(tb[c], signed[1])),
-                    _ => (f64::from(ta[c]), f64::from(tb[c])),
-                };
-                if is_opposite {
-                    y = 1.0 - y;
-                }
-                let turned = if channels == 0 && c == 1 { -y } else { y };
-                sums[0] += (x - y).powi(2);
-                sums[1] += (x - turned).powi(2);
-                moments[c][0] += x;
-                moments[c][1] += x * x;
+            for (c, (x, y)) in ta.iter().zip(tb).take(used).enumerate() {
+                let (x, y) = (value(*x, signed[0]), value(*y, signed[1]));
+                let y = if is_opposite { 1.0 - y } else { y };
+                row.add(c, x, y, if is_normal && c == 1 { -y } else { y });
             }
         }
-        (sums, moments)
+        row
     });
-    let used = if channels == 0 { 2 } else { channels };
     let texels = (rows.len() * a.width as usize).max(1) as f64;
-    let count = texels * used as f64;
-    let sum = |pick: &dyn Fn(&([f64; 2], [[f64; 2]; 3])) -> f64| rows.iter().map(pick).sum::<f64>();
-    let variance = (0..used)
-        .map(|c| sum(&|row| row.1[c][1]) / texels - (sum(&|row| row.1[c][0]) / texels).powi(2))
-        .sum::<f64>()
-        / used as f64;
+    let sum = rows.iter().fold(Sums::default(), |sum, row| sum.and(row));
+    let mean_square = |squares: f64| (squares / (texels * used as f64)).sqrt();
+    let variances = sum.first.iter().zip(&sum.squares).take(used);
+    let variance = variances.map(|(first, square)| square / texels - (first / texels).powi(2)).sum::<f64>();
     Some(Apart {
-        plain: (sum(&|row| row.0[0]) / count).sqrt(),
-        turned: (sum(&|row| row.0[1]) / count).sqrt(),
-        spread: variance.max(0.0).sqrt(),
+        plain: mean_square(sum.plain),
+        turned: mean_square(sum.turned),
+        spread: (variance / used as f64).max(0.0).sqrt(),
     })
+}
+
+/// Sums over the texels of two images.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    /// Squares of differences, and with green turned over.
+    plain: f64,
+    turned: f64,
+    /// Of the first image, by channel, and its squares.
+    first: [f64; 3],
+    squares: [f64; 3],
+}
+
+impl Sums {
+    fn add(&mut self, channel: usize, x: f64, y: f64, turned: f64) {
+        self.plain += (x - y).powi(2);
+        self.turned += (x - turned).powi(2);
+        self.first[channel] += x;
+        self.squares[channel] += x * x;
+    }
+
+    fn and(self, other: &Sums) -> Sums {
+        let add = |a: [f64; 3], b: [f64; 3]| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+        Sums {
+            plain: self.plain + other.plain,
+            turned: self.turned + other.turned,
+            first: add(self.first, other.first),
+            squares: add(self.squares, other.squares),
+        }
+    }
 }
 
 /// Whether an image shows no colour: one channel, or three that differ by no more than what JPEG does to
