@@ -637,6 +637,11 @@ fn sets_as_exporters_name_them_fall_apart_or_together() {
             &["W_Normal_red.png", "W_Rough_red.png", "W_Normal_blue.png", "W_Rough_blue.png"],
             &["W_blue: normal roughness", "W_red: normal roughness"],
         ),
+        (
+            "previews beside maps",
+            &["W_Normal.png", "W_Normal_preview.png", "W_Rough.png", "W_Rough_preview.png"],
+            &["W: normal roughness"],
+        ),
         ("the role before", &["normal_brick.png", "roughness_brick.png"], &["brick: normal roughness"]),
         (
             "a material called as a role",
@@ -831,6 +836,40 @@ fn two_normal_maps_are_told_apart_by_their_names() {
             assert!(error.contains(part), "wanted \"{part}\" in: {error}");
         }
     }
+}
+
+/// Red, green and blue as JPEG with halved colour keeps them: of every four texels one mean of both colour differences.
+fn colour_halved(image: &Image, side: u32, over: bool) -> Image {
+    let texel = |x: u32, y: u32| {
+        let [r, g, b, _] = image.texel(x, y);
+        [r, if over { 1.0 - g } else { g }, b]
+    };
+    let luma = |[r, g, b]: [f32; 3]| 0.299 * r + 0.587 * g + 0.114 * b;
+    let mut samples = Vec::new();
+    for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
+        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| texel(x / 2 * 2 + i, y / 2 * 2 + j));
+        let mean = |c: usize| four.iter().map(|t| t[c] - luma(*t)).sum::<f32>() / 4.0;
+        let (own, blue, red) = (luma(texel(x, y)), mean(2), mean(0));
+        let green = own - (0.114 * blue + 0.299 * red) / 0.587;
+        samples.extend([own + red, green, own + blue].map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8));
+    }
+    Image::new(side, side, Channels::Rgb, Pixels::U8(samples)).unwrap()
+}
+
+#[test]
+fn a_pair_is_not_known_again_after_jpeg() {
+    let Some(assets) = sample_assets() else { return };
+    let mut tried = 0;
+    for folder in material_folders(&assets) {
+        let Ok(image) = read_image(&folder.join("normal.png")) else { continue };
+        let side = image.width.min(image.height).min(512) / 2 * 2;
+        let [up, down] = [false, true].map(|over| colour_halved(&image, side, over));
+        let dir = painted(&[("w_NormalGL.png", &up), ("w_NormalDX.png", &down)]);
+        let material = scan(dir.path(), &Hints::default()).unwrap().materials.remove(0);
+        material.compare_twins().unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+        tried += 1;
+    }
+    assert!(tried > 30, "only {tried} normal maps");
 }
 
 #[test]

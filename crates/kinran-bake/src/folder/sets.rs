@@ -10,6 +10,9 @@ use super::{Found, Role, add_note};
 const SET: usize = 2;
 const SET_OF_A_ROLE: usize = 3;
 
+/// Words behind a role that name a picture of a map, and no map.
+const PICTURES_OF: [&str; 6] = ["preview", "thumb", "thumbnail", "icon", "render", "sphere"];
+
 /// Chooses among the readings of each file's name by those of the others.
 pub(super) fn settle(found: &mut [Found]) {
     let sets = Sets::of(found);
@@ -106,7 +109,10 @@ impl Sets {
 
     /// Whether a name without a role at its end may be read with a tail.
     fn accepts_unknown(&self, name: &Name) -> bool {
-        is_tile(&name.tail) || self.roles(&name.stem, &name.tail) >= SET
+        let is_picture = || {
+            name.tail.split('_').any(|word| PICTURES_OF.iter().any(|other| word.eq_ignore_ascii_case(other)))
+        };
+        is_tile(&name.tail) || (self.roles(&name.stem, &name.tail) >= SET && !is_picture())
     }
 
     /// Whether what looks like a role at a name's end is a word of the whole set: every file of the set has it, or one of

@@ -178,7 +178,7 @@ pub(crate) struct BakeReport {
     pub(super) filter: &'static str,
     /// The footprint's shape.
     pub(super) kernel: String,
-    /// Of a folder: every image file, and what was understood of it.
+    /// Of a folder: every file, and what was understood of it; "-" where something is assumed.
     pub(super) files: Vec<Row>,
     /// The surfaces.
     pub(super) surfaces: Vec<SurfaceReport>,
