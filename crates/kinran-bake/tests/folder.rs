@@ -857,7 +857,7 @@ fn colour_halved(image: &Image, side: u32, over: bool) -> Image {
 }
 
 #[test]
-fn a_pair_is_not_known_again_after_jpeg() {
+fn sample_assets_saved_as_jpeg_are_not_known_again() {
     let Some(assets) = sample_assets() else { return };
     let mut tried = 0;
     for folder in material_folders(&assets) {
