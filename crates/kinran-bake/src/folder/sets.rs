@@ -16,41 +16,34 @@ const PICTURES_OF: [&str; 6] = ["preview", "thumb", "thumbnail", "icon", "render
 /// Chooses among the readings of each file's name by those of the others.
 pub(super) fn settle(found: &mut [Found]) {
     let sets = Sets::of(found);
-    for i in 0..found.len() {
-        let first = &found[i].readings[0];
+    for (i, file) in found.iter_mut().enumerate() {
+        let first = &file.readings[0];
         let chosen = match first.role {
-            None => found[i].readings[1..].iter().find(|name| sets.accepts_unknown(name)),
-            Some(_) if first.joined => found[i].readings.get(1).filter(|name| sets.has_whole(&name.stem, i)),
-            Some(_) => found[i].readings[1..].iter().find(|name| sets.accepts_role(name)),
+            None => file.readings[1..].iter().find(|name| sets.accepts_unknown(name)),
+            Some(_) if first.joined => file.readings.get(1).filter(|name| sets.has_whole(&name.stem, i)),
+            Some(_) => file.readings[1..].iter().find(|name| sets.accepts_role(name)),
         };
         if let Some(chosen) = chosen.cloned() {
-            let file = &mut found[i];
             if is_tile(&chosen.tail) {
                 add_note(&mut file.note, &format!("tile {}", chosen.tail));
-            } else if first_has_role(file) && !chosen.tail.is_empty() {
+            } else if first.role.is_some() && !chosen.tail.is_empty() {
                 add_note(&mut file.note, &format!("{} stands in every name of the set", chosen.tail));
             }
             file.role = chosen.role;
             file.name = Name { stem: sets.stem(&chosen), ..chosen };
         } else if first.role.is_some() && first.ends_in_1024 && sets.has_tiles(&first.stem) {
-            let file = &mut found[i];
             file.name.stem += "_1024";
             add_note(&mut file.note, "tile 1024");
         } else if first.role.is_none()
-            && let Some(near) = found[i].readings.get(1).filter(|name| sets.has_whole(&name.stem, i))
+            && let Some(near) = file.readings.get(1).filter(|name| sets.has_whole(&name.stem, i))
             && let Some(role) = near.role.filter(|role| role.is_used())
         {
-            let tail = near.tail.clone();
-            found[i].note = format!(
-                "{tail} behind the {role} is not understood; --map {role}={} takes it for one",
-                found[i].file
+            let (tail, file_name) = (&near.tail, &file.file);
+            file.note = format!(
+                "{tail} behind the {role} is not understood; --map {role}={file_name} takes it for one"
             );
         }
     }
-}
-
-fn first_has_role(file: &Found) -> bool {
-    file.readings[0].role.is_some()
 }
 
 /// Whether words behind a role are the number of a tile, as UDIM or as `u1_v1`.
