@@ -18,7 +18,7 @@
 //! | `anisotropylevel` `anisolevel` | `anisotropy-level` | R, Adobe Standard Material: `alpha_t = min(1, alpha + level⁴)` | Substance |
 //! | `anisotropy` | `anisotropy` | RG direction, B strength | glTF (`KHR_materials_anisotropy`) |
 //! | `aniso` | `aniso` | RGB, an aniso texel | Kinran |
-//! | `albedo` `basecolor` `diffuse` `diff` `color` `col`, `…colour`; `basemap` `maintex` `albedotransparency` | `color` | RGB, sRGB | all; Unity |
+//! | `albedo` `basecolor` `diffuse` `diff` `color` `col`, `…colour`; `basemap` `maintex` `albedotransparency` | `color` | RGB; sRGB, of EXR, HDR and float TIFF linear | all; Unity |
 //! | `ao` `occ` `occlusion` `ambientocclusion` `mixedao` | `occlusion` | R | all |
 //! | `metallic` `metalness` `metal` | `metallic` | R | all |
 //! | `orm` `arm` `aorm` `occlusionroughnessmetallic` | `orm` | R occlusion, G roughness, B metallic | Unreal, Poly Haven, glTF, Substance |
@@ -52,6 +52,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use kinran_image::{IMAGE_EXTENSIONS, Transfer, has_image_extension};
 use kinran_scene::Wrap;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -63,13 +64,10 @@ pub use load::{LoadedMap, LoadedMaterial};
 pub use names::{Green, Role};
 pub use twins::Twin;
 
-/// Extensions of files that are read.
-pub(crate) const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "tga", "tif", "tiff", "exr", "hdr"];
-
-/// Extensions of other pictures; what is in both lists is read.
-const PICTURES: [&str; 29] = [
-    "avif", "basis", "bmp", "dds", "dpx", "gif", "heic", "heif", "iff", "j2k", "jfif", "jp2", "jpe", "jxl",
-    "kra", "ktx", "ktx2", "ora", "pbm", "pgm", "pic", "ppm", "psb", "psd", "sgi", "svg", "tx", "webp", "xcf",
+/// Extensions of other pictures.
+const PICTURES: [&str; 23] = [
+    "avif", "basis", "dpx", "gif", "heic", "heif", "iff", "j2k", "jp2", "jxl", "kra", "ktx", "ora", "pbm",
+    "pgm", "pic", "ppm", "psb", "psd", "sgi", "svg", "tx", "xcf",
 ];
 
 /// A folder of maps in an archive beside other files.
@@ -100,6 +98,11 @@ pub struct Hints {
     pub force_normal: bool,
     /// `--normal-blue`: z of normals is blue, not rebuilt.
     pub normal_blue: bool,
+    /// `--color-space`: how colour maps are encoded, whatever their files say.
+    pub color_space: Option<Transfer>,
+    /// `--exr-layer FILE=LAYER`: the layer of an EXR file that holds the map; the file by its name in the folder, or by a
+    /// path.
+    pub layers: Vec<(PathBuf, String)>,
     /// What lies beyond the maps' borders.
     pub wrap: [Wrap; 2],
 }
@@ -116,6 +119,8 @@ impl Default for Hints {
             anisotropy: None,
             force_normal: false,
             normal_blue: false,
+            color_space: None,
+            layers: Vec::new(),
             wrap: [Wrap::Repeat; 2],
         }
     }
@@ -134,7 +139,7 @@ pub enum FolderError {
     #[error(
         "{}: no maps found; looked for {} files called …_normal, …_roughness, …_gloss, …_color, …_ARM and \
          the like, saw {}; rename them, or name each with --map ROLE=FILE",
-        folder.display(), EXTENSIONS.join("/"), listed(seen)
+        folder.display(), IMAGE_EXTENSIONS.join("/"), listed(seen)
     )]
     NoMaps {
         /// The folder.
@@ -331,6 +336,10 @@ pub struct MaterialMaps {
     pub roughness: Option<RoughnessSource>,
     /// Base colour.
     pub color: Option<PathBuf>,
+    /// How it is encoded, where a flag says it; else its file does ([`Image::transfer`](kinran_image::Image::transfer)).
+    pub color_space: Option<Transfer>,
+    /// Of EXR files, the layers that flags name.
+    pub layers: Vec<(PathBuf, String)>,
     /// Ambient occlusion.
     pub occlusion: Option<MapChannel>,
     /// Metalness.
@@ -445,6 +454,7 @@ pub fn scan(folder: &Path, hints: &Hints) -> Result<Folder, FolderError> {
         seen.sort();
         return Err(FolderError::NoMaps { folder: folder.into(), seen });
     }
+    name_layers(folder, hints, &mut result.materials)?;
     Ok(result)
 }
 
@@ -480,6 +490,25 @@ fn assumptions(material: &MaterialMaps, files: &[Found], hints: &Hints, stranger
 /// Whether a material has a surface, and no normal map on it.
 fn is_flat(material: &MaterialMaps) -> bool {
     material.roughness.is_some() && material.normal.is_none()
+}
+
+/// Tells the materials which layers `--exr-layer` names.
+fn name_layers(folder: &Path, hints: &Hints, materials: &mut [MaterialMaps]) -> Result<(), FolderError> {
+    for (path, layer) in &hints.layers {
+        let mut used = false;
+        for material in &mut *materials {
+            let mut files = material.files.iter().map(|(_, file)| file);
+            if let Some(file) = files.find(|file| *file == path || **file == folder.join(path)).cloned() {
+                material.layers.push((file, layer.clone()));
+                used = true;
+            }
+        }
+        if !used {
+            let flag = format!("--exr-layer {}={layer}", path.display());
+            return Err(FolderError::Flag { flag, reason: "no map that is used is in such a file".into() });
+        }
+    }
+    Ok(())
 }
 
 fn check_flags(hints: &Hints) -> Result<(), FolderError> {
@@ -558,7 +587,7 @@ fn list_one(folder: &Path, prefix: &str) -> Result<Listing, FolderError> {
         }
         if path.is_dir() {
             listing.folders.push(file);
-        } else if is_one_of(&path, &EXTENSIONS) || is_one_of(&path, &PICTURES) {
+        } else if has_image_extension(&path) || is_one_of(&path, &PICTURES) {
             listing.found.push(Found { file: format!("{prefix}{file}"), ..found_file(path) });
         } else {
             listing.others.push(format!("{prefix}{file}"));
@@ -614,7 +643,7 @@ fn found_file(path: PathBuf) -> Found {
         role: name.role,
         name,
         readings,
-        unread: !is_one_of(&path, &EXTENSIONS),
+        unread: !has_image_extension(&path),
         path,
         forced: false,
         dropped: None,
@@ -1012,6 +1041,8 @@ fn understand(
         normal,
         roughness: source,
         color,
+        color_space: hints.color_space,
+        layers: Vec::new(),
         occlusion,
         metallic,
         files: used,

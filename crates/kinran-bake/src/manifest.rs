@@ -33,13 +33,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use kinran_image::has_image_extension;
 use kinran_scene::is_gltf;
 use schemars::JsonSchema;
 use serde::Serialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::folder::EXTENSIONS;
 use crate::patterns::PathPattern;
 
 /// Bytes of the manifest's text.
@@ -103,7 +103,7 @@ impl Kind {
         match self {
             Kind::Aniso => path.is_dir(),
             Kind::Mesh => path.is_file() && is_gltf(path),
-            Kind::Detail => path.is_file() && EXTENSIONS.into_iter().any(is),
+            Kind::Detail => path.is_file() && has_image_extension(path),
             Kind::Skin => path.is_file() && (is("csv") || is("json")),
         }
     }

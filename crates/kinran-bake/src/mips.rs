@@ -295,7 +295,7 @@ impl ImagePlanes<'_> {
         let at = Place { size: self.size, y, x0, wrap: self.wrap };
         for (channel, plane) in planes.enumerate() {
             read_channel(self.image, channel, at, plane);
-            if self.transfer == Transfer::Srgb && channel < 3 {
+            if self.transfer == Transfer::Srgb && self.image.transfer != Transfer::Linear && channel < 3 {
                 for v in plane {
                     *v = linear_from_srgb(*v);
                 }
@@ -341,7 +341,8 @@ pub struct Rgba8Level {
 }
 
 /// The mip chain of an image that needs no filter of its own, at level-0 size `size` (enlarged bilinearly
-/// where the image is smaller). Averages are taken in linear light and rounded once, from floats.
+/// where the image is smaller). Averages are taken in linear light and rounded once, from floats. `transfer` is that of
+/// the levels; with [`Transfer::Srgb`] the image is colour, encoded as it says itself ([`Image::transfer`]).
 pub fn plain_levels(
     image: &Image,
     size: (u32, u32),
@@ -402,7 +403,7 @@ pub fn pack_channels(
     Image::new(size.0, size.1, Channels::Rgba, Pixels::U8(bytes))
 }
 
-/// The mip chain of an image that needs no filter of its own, compressed.
+/// The mip chain of an image that needs no filter of its own, compressed. `transfer` as for [`plain_levels`].
 ///
 /// # Errors
 /// [`Error::Unsupported`] where the encoder refuses.

@@ -233,7 +233,7 @@ impl Table {
         }
         let decode = |x: f32| match texture.transfer {
             Transfer::Srgb => crate::linear_from_srgb(x),
-            Transfer::Linear => x,
+            Transfer::Linear | Transfer::Unsaid => x,
         };
         let pairs = self.entries.iter().zip(&decoded);
         let differences = pairs.flat_map(|(e, d)| (0..3).map(move |c| (e[c] - decode(d[c])).abs()));

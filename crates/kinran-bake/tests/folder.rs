@@ -1159,6 +1159,162 @@ fn float_maps_with_negative_components_are_normals_too() {
     assert_eq!(loaded.notes, [""; 0]);
 }
 
+/// A TIFF of one RGB texel of floats, by hand.
+fn float_tiff(rgb: [f32; 3]) -> Vec<u8> {
+    // Bits and sample format are lists of three shorts after the directory.
+    let entries: [(u16, u16, u32, u32); 11] = [
+        (256, 3, 1, 1),
+        (257, 3, 1, 1),
+        (258, 3, 3, 158),
+        (259, 3, 1, 1),
+        (262, 3, 1, 2),
+        (273, 4, 1, 146),
+        (277, 3, 1, 3),
+        (278, 3, 1, 1),
+        (279, 4, 1, 12),
+        (284, 3, 1, 1),
+        (339, 3, 3, 164),
+    ];
+    let mut bytes = b"II\x2a\0\x08\0\0\0".to_vec();
+    bytes.extend((entries.len() as u16).to_le_bytes());
+    for (tag, kind, count, value) in entries {
+        bytes.extend(tag.to_le_bytes());
+        bytes.extend(kind.to_le_bytes());
+        bytes.extend(count.to_le_bytes());
+        bytes.extend(value.to_le_bytes());
+    }
+    bytes.resize(146, 0);
+    bytes.extend(rgb.iter().flat_map(|v| v.to_le_bytes()));
+    bytes.extend([32_u16, 32, 32, 3, 3, 3].iter().flat_map(|v| v.to_le_bytes()));
+    bytes
+}
+
+/// Half the light is code 188: 1.055 * 0.5^(1 / 2.4) - 0.055 = 0.7354. An eighth is 99. A colour of 0.5 as it is would be 128.
+#[test]
+fn linear_colour_is_taken_as_srgb() {
+    use kinran_bake::aniso::Kernel;
+    use kinran_bake::bake_plain;
+    use kinran_image::{Encoding, Format, Role, Transfer, write_exr};
+    let rgb = [0.5, 0.125, 1.0];
+    let dir = tempfile::tempdir().unwrap();
+    let floats = Image::new(1, 1, Channels::Rgb, Pixels::F32(rgb.to_vec())).unwrap();
+    let eight = Image::new(1, 1, Channels::Rgb, Pixels::U8(vec![188, 99, 255])).unwrap();
+    write_exr(&dir.path().join("a_color.exr"), &floats).unwrap();
+    write_png(&dir.path().join("b_color.png"), &eight).unwrap();
+    fs::write(dir.path().join("c_color.tif"), float_tiff(rgb)).unwrap();
+    // Mantissas of 1/128: 64, 16 and 128.
+    let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x40\x10\x80\x81";
+    fs::write(dir.path().join("d_color.hdr"), hdr).unwrap();
+    let baked = |hints: &Hints| -> Vec<(String, [u8; 3], String)> {
+        let folder = scan(dir.path(), hints).unwrap();
+        let materials = folder.materials.iter().map(|material| material.load().unwrap());
+        let texel = |material: LoadedMaterial| {
+            let map = &material.images[0];
+            let encoding = Encoding { format: Format::Rgba8, ..Role::Color.encoding() };
+            let texture = bake_plain(&map.image, Transfer::Srgb, encoding, Kernel::Box, hints.wrap).unwrap();
+            let data = &texture.levels[0].data;
+            (material.name, [data[0], data[1], data[2]], map.remarks.join("; "))
+        };
+        materials.map(texel).collect()
+    };
+    for (name, got, remarks) in baked(&Hints::default()) {
+        assert_eq!(got, [188, 99, 255], "{name}");
+        // A PNG is sRGB as ever, and nothing is said of it.
+        assert!(
+            if name == "b" { remarks.is_empty() } else { remarks.contains("linear") },
+            "{name}: {remarks}"
+        );
+    }
+    let srgb = Hints { color_space: Some(Transfer::Srgb), ..Hints::default() };
+    for (name, got, remarks) in baked(&srgb) {
+        // 0.5 lies between two codes.
+        let wanted = if name == "b" { [188, 99, 255] } else { [128, 32, 255] };
+        let near = got[0].abs_diff(wanted[0]) <= 1 && got[1..] == wanted[1..];
+        assert!(near, "{name}, by flag: wanted {wanted:?}, got {got:?}");
+        assert_eq!(remarks, "sRGB, by --color-space", "{name}");
+    }
+    let linear = Hints { color_space: Some(Transfer::Linear), ..Hints::default() };
+    // Code 188 taken as light is 0.737, whose code is 222: 1.055 * 0.737^(1 / 2.4) - 0.055 = 0.8741, times 255 is 222.9.
+    assert_eq!(baked(&linear)[1].1[0], 223, "a PNG of light, by flag");
+}
+
+#[test]
+fn layers_of_an_exr_file_are_named_by_the_flag_or_told() {
+    use kinran_image::write_exr_planes;
+    let dir = tempfile::tempdir().unwrap();
+    let half = |v: f32| vec![v; 4];
+    let planes = vec![
+        ("View.Combined.R", half(1.0)),
+        ("View.Combined.G", half(0.0)),
+        ("View.Combined.B", half(0.0)),
+        ("View.Normal.X", half(0.5)),
+        ("View.Normal.Y", half(0.5)),
+        ("View.Normal.Z", half(1.0)),
+    ];
+    write_exr_planes(&dir.path().join("x_normal.exr"), (2, 2), planes).unwrap();
+    let hints = Hints { roughness: Some(0.5), ..Hints::default() };
+    let material = |hints: &Hints| scan(dir.path(), hints).unwrap().materials.remove(0);
+    let error = material(&hints).load().unwrap_err().to_string();
+    for part in ["x_normal.exr", "View.Combined, View.Normal", "--exr-layer"] {
+        assert!(error.contains(part), "no {part} in {error}");
+    }
+    let layers = vec![("x_normal.exr".into(), "View.Normal".into())];
+    let loaded = material(&Hints { layers, ..hints.clone() }).load().unwrap();
+    assert_eq!(loaded.images[0].image.texel(1, 1), [0.5, 0.5, 1.0, 1.0]);
+    let remark = "layer \"View.Normal\"; X, Y, Z as red, green, blue; left out: View.Combined";
+    assert_eq!(loaded.images[0].remarks, [remark]);
+    let layers = vec![("y.exr".into(), "View.Normal".into())];
+    let error = scan(dir.path(), &Hints { layers, ..hints }).unwrap_err().to_string();
+    assert!(error.contains("--exr-layer y.exr=View.Normal") && error.contains("no map"), "{error}");
+}
+
+#[test]
+fn files_of_a_kind_that_is_read_are_found_whatever_their_extension() {
+    for extension in kinran_image::IMAGE_EXTENSIONS {
+        let names = [
+            format!("x_normal.{extension}"),
+            format!("x_2k_{extension}_roughness.{}", extension.to_uppercase()),
+        ];
+        let material = only(&[&names[0], &names[1]], &Hints::default());
+        assert_eq!(material.name, "x", "{names:?}");
+        assert!(material.normal.is_some() && !material.files.is_empty(), "{names:?}");
+        let base = BaseRoughness::Constant(ASSUMED_ROUGHNESS);
+        assert_ne!(material.roughness, Some(RoughnessSource::Isotropic(base)), "{names:?}");
+    }
+}
+
+/// A BC5 map has no blue; z comes from x and y.
+#[test]
+fn normals_in_engine_textures_are_read() {
+    use kinran_image::{Encoding, Format, Level, Role, Texture, Transfer, encode, write_texture};
+    let image = waves(Green::Up);
+    let mut bytes = Vec::new();
+    for y in 0..64 {
+        bytes.extend((0..64).flat_map(|x| image.texel(x, y).map(|v| (v * 255.0).round() as u8)));
+    }
+    for (name, format) in
+        [("x_normal.ktx2", Format::Bc5), ("x_normal.dds", Format::Bc5), ("x_normal.dds", Format::Rgba8)]
+    {
+        let data = encode(Encoding { format, ..Role::Normal.encoding() }, &bytes, 64, 64).unwrap();
+        let levels = vec![Level { width: 64, height: 64, data }];
+        let texture = Texture { format, transfer: Transfer::Linear, levels, metadata: Default::default() };
+        let dir = tempfile::tempdir().unwrap();
+        write_texture(&dir.path().join(name), &texture, None).unwrap();
+        let hints = Hints { roughness: Some(0.5), ..Hints::default() };
+        let loaded = scan(dir.path(), &hints).unwrap().materials[0].load().unwrap();
+        assert_eq!(loaded.notes, [""; 0], "{name} {format:?}");
+        let read = &loaded.images[0].image;
+        for (x, y) in [(3, 5), (17, 40), (63, 63)] {
+            let (wanted, got) = (image.texel(x, y), read.texel(x, y));
+            for c in 0..3 {
+                // Blocks of BC5 are good to two steps of a smooth map.
+                let error = (wanted[c] - got[c]).abs() * 255.0;
+                assert!(error < 3.0, "{name} {format:?} ({x}, {y}): wanted {wanted:?}, got {got:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn gloss_is_one_minus_roughness() {
     for (name, hints) in [
@@ -1427,6 +1583,8 @@ fn sample_assets_of_another_kind_pass_for_normals() {
                 }),
                 roughness: Some(RoughnessSource::Isotropic(BaseRoughness::Constant(0.5))),
                 color: None,
+                color_space: None,
+                layers: Vec::new(),
                 occlusion: None,
                 metallic: None,
                 files: vec![(Role::Normal, wrong.clone())],

@@ -1,9 +1,12 @@
-//! DDS containers with the DX10 header (Microsoft, "Programming Guide for DDS").
+//! DDS containers (Microsoft, "Programming Guide for DDS"), written with the DX10 header, read with the older one too.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use ddsfile::{AlphaMode, Caps2, D3D10ResourceDimension, Dds, DxgiFormat, Header, Header10, MiscFlag};
+use ddsfile::{
+    AlphaMode, Caps2, D3D10ResourceDimension, Dds, DxgiFormat, Header, Header10, MiscFlag, PixelFormat,
+    PixelFormatFlags,
+};
 
 use crate::image::check_sides;
 use crate::texture::{full_level_count, level_size};
@@ -16,6 +19,7 @@ use crate::{Error, Format, Level, Texture, Transfer};
 /// which the header cannot say.
 pub fn encode_dds(texture: &Texture) -> Result<Vec<u8>, Error> {
     texture.check()?;
+    texture.check_transfer()?;
     let first = &texture.levels[0];
     if u32::try_from(first.data.len()).is_err() {
         return Err(Error::Unsupported("DDS holds less than 4 GiB; write KTX2 or a block format".into()));
@@ -39,21 +43,24 @@ pub fn encode_dds(texture: &Texture) -> Result<Vec<u8>, Error> {
 }
 
 fn dxgi_format(format: Format, transfer: Transfer) -> DxgiFormat {
-    use Transfer::{Linear, Srgb};
+    use Transfer::Srgb;
     match (format, transfer) {
-        (Format::Bc1, Linear) => DxgiFormat::BC1_UNorm,
         (Format::Bc1, Srgb) => DxgiFormat::BC1_UNorm_sRGB,
+        (Format::Bc1, _) => DxgiFormat::BC1_UNorm,
         (Format::Bc4, _) => DxgiFormat::BC4_UNorm,
         (Format::Bc5, _) => DxgiFormat::BC5_UNorm,
-        (Format::Bc7, Linear) => DxgiFormat::BC7_UNorm,
         (Format::Bc7, Srgb) => DxgiFormat::BC7_UNorm_sRGB,
-        (Format::Rgba8, Linear) => DxgiFormat::R8G8B8A8_UNorm,
+        (Format::Bc7, _) => DxgiFormat::BC7_UNorm,
         (Format::Rgba8, Srgb) => DxgiFormat::R8G8B8A8_UNorm_sRGB,
+        (Format::Rgba8, _) => DxgiFormat::R8G8B8A8_UNorm,
         (Format::Rgba16F, _) => DxgiFormat::R16G16B16A16_Float,
     }
 }
 
-/// Reads a DDS file with a DX10 header: a 2D texture in one of our formats.
+/// Reads a DDS file: a 2D texture in one of our formats, or in 32 bits a texel with the channels in any order.
+///
+/// Headers that are older than DirectX 10 (`DXT1`, `ATI1`, `ATI2`, `BC4U`, `BC5U`, plain ones) and typeless formats do not
+/// say whether colour is sRGB: [`Transfer::Unsaid`], but for BC4 and BC5, which cannot be.
 ///
 /// # Errors
 /// [`Error::Malformed`] under the name `name`, for every file that is not exactly that.
@@ -61,25 +68,33 @@ pub fn decode_dds(name: &Path, bytes: &[u8]) -> Result<Texture, Error> {
     parse(bytes).map_err(|reason| Error::malformed(name, format!("DDS: {reason}")))
 }
 
+/// A file's layout: the format its texels get, what is known of their colours, and for 32 bits a texel which byte holds
+/// red, green, blue and alpha.
+type Layout = (Format, Transfer, Option<[Option<usize>; 4]>);
+
 fn parse(bytes: &[u8]) -> Result<Texture, String> {
     // Only the headers go through the parser, which would copy the texels.
-    const HEADERS: usize = 4 + 124 + 20;
+    const HEADER: usize = 4 + 124;
+    const HEADERS: usize = HEADER + 20;
     let head = &bytes[..bytes.len().min(HEADERS)];
     let dds = Dds::read(head).map_err(|e| format!("{e}; the file is damaged or truncated"))?;
-    let Some(header10) = dds.header10 else {
-        return Err("it has no DX10 header, so nothing says whether it is sRGB; convert it with one".into());
+    let (layout, data) = match &dds.header10 {
+        Some(header10) => {
+            let f = header10.dxgi_format;
+            (modern(f).ok_or_else(|| format!("format {f:?}")), HEADERS)
+        }
+        None => (legacy(&dds.header.spf), HEADER),
     };
-    let Some((format, transfer)) = our_format(header10.dxgi_format) else {
-        let f = header10.dxgi_format;
-        return Err(format!("format {f:?} is not read; convert to BC1, BC4, BC5, BC7, RGBA8 or RGBA16F"));
-    };
+    let (format, transfer, order) = layout
+        .map_err(|format| format!("{format} is not read; convert to BC1, BC4, BC5, BC7, RGBA8 or RGBA16F"))?;
     let (width, height) = (dds.header.width, dds.header.height);
     check_sides(width, height)?;
-    if header10.resource_dimension != D3D10ResourceDimension::Texture2D
-        || header10.array_size > 1
-        || header10.misc_flag.contains(MiscFlag::TEXTURECUBE)
-        || dds.header.caps2.intersects(Caps2::CUBEMAP | Caps2::VOLUME)
-    {
+    let array = dds.header10.as_ref().is_some_and(|header10| {
+        header10.resource_dimension != D3D10ResourceDimension::Texture2D
+            || header10.array_size > 1
+            || header10.misc_flag.contains(MiscFlag::TEXTURECUBE)
+    });
+    if array || dds.header.caps2.intersects(Caps2::CUBEMAP | Caps2::VOLUME) {
         return Err("it is a volume, an array or a cube; only plain 2D textures are read".into());
     }
     let level_count = dds.header.mip_map_count.unwrap_or(1).max(1) as usize;
@@ -87,7 +102,7 @@ fn parse(bytes: &[u8]) -> Result<Texture, String> {
         return Err(format!("it claims {level_count} levels, more than {width}x{height} can have"));
     }
 
-    let mut rest = &bytes[HEADERS..];
+    let mut rest = &bytes[data..];
     let mut levels = Vec::with_capacity(level_count);
     for i in 0..level_count {
         let (width, height) = (level_size(width, i), level_size(height, i));
@@ -98,23 +113,86 @@ fn parse(bytes: &[u8]) -> Result<Texture, String> {
                 "level {i}, {width}x{height} in {format:?}, needs {wanted} bytes, {left} are left"
             ));
         };
-        levels.push(Level { width, height, data: data.to_vec() });
+        let mut data = data.to_vec();
+        if let Some(order) = order {
+            for texel in data.as_chunks_mut::<4>().0 {
+                *texel = order.map(|byte| byte.map_or(255, |byte| texel[byte]));
+            }
+        }
+        levels.push(Level { width, height, data });
         rest = after;
     }
     Ok(Texture { format, transfer, levels, metadata: BTreeMap::new() })
 }
 
-fn our_format(format: DxgiFormat) -> Option<(Format, Transfer)> {
+/// Blue first, as Windows has it.
+const BGRA: Option<[Option<usize>; 4]> = Some([Some(2), Some(1), Some(0), Some(3)]);
+const BGRX: Option<[Option<usize>; 4]> = Some([Some(2), Some(1), Some(0), None]);
+
+fn modern(format: DxgiFormat) -> Option<Layout> {
+    use DxgiFormat as F;
+    use Transfer::{Linear, Srgb, Unsaid};
     Some(match format {
-        DxgiFormat::BC1_UNorm => (Format::Bc1, Transfer::Linear),
-        DxgiFormat::BC1_UNorm_sRGB => (Format::Bc1, Transfer::Srgb),
-        DxgiFormat::BC4_UNorm => (Format::Bc4, Transfer::Linear),
-        DxgiFormat::BC5_UNorm => (Format::Bc5, Transfer::Linear),
-        DxgiFormat::BC7_UNorm => (Format::Bc7, Transfer::Linear),
-        DxgiFormat::BC7_UNorm_sRGB => (Format::Bc7, Transfer::Srgb),
-        DxgiFormat::R8G8B8A8_UNorm => (Format::Rgba8, Transfer::Linear),
-        DxgiFormat::R8G8B8A8_UNorm_sRGB => (Format::Rgba8, Transfer::Srgb),
-        DxgiFormat::R16G16B16A16_Float => (Format::Rgba16F, Transfer::Linear),
+        F::BC1_UNorm => (Format::Bc1, Linear, None),
+        F::BC1_UNorm_sRGB => (Format::Bc1, Srgb, None),
+        F::BC1_Typeless => (Format::Bc1, Unsaid, None),
+        F::BC4_UNorm | F::BC4_Typeless => (Format::Bc4, Linear, None),
+        F::BC5_UNorm | F::BC5_Typeless => (Format::Bc5, Linear, None),
+        F::BC7_UNorm => (Format::Bc7, Linear, None),
+        F::BC7_UNorm_sRGB => (Format::Bc7, Srgb, None),
+        F::BC7_Typeless => (Format::Bc7, Unsaid, None),
+        F::R8G8B8A8_UNorm => (Format::Rgba8, Linear, None),
+        F::R8G8B8A8_UNorm_sRGB => (Format::Rgba8, Srgb, None),
+        F::R8G8B8A8_Typeless => (Format::Rgba8, Unsaid, None),
+        F::B8G8R8A8_UNorm => (Format::Rgba8, Linear, BGRA),
+        F::B8G8R8A8_UNorm_sRGB => (Format::Rgba8, Srgb, BGRA),
+        F::B8G8R8A8_Typeless => (Format::Rgba8, Unsaid, BGRA),
+        F::B8G8R8X8_UNorm => (Format::Rgba8, Linear, BGRX),
+        F::B8G8R8X8_UNorm_sRGB => (Format::Rgba8, Srgb, BGRX),
+        F::B8G8R8X8_Typeless => (Format::Rgba8, Unsaid, BGRX),
+        F::R16G16B16A16_Float => (Format::Rgba16F, Linear, None),
         _ => return None,
     })
+}
+
+/// The layout that a header from before DirectX 10 describes, or what to call it where it is none of ours.
+fn legacy(pixels: &PixelFormat) -> Result<Layout, String> {
+    /// `D3DFMT_A16B16G16R16F`.
+    const HALF_FLOATS: u32 = 113;
+    use Transfer::{Linear, Unsaid};
+    if let Some(code) = &pixels.fourcc {
+        return Ok(match &code.0.to_le_bytes() {
+            b"DXT1" => (Format::Bc1, Unsaid, None),
+            b"ATI1" | b"BC4U" => (Format::Bc4, Linear, None),
+            b"ATI2" | b"BC5U" | b"A2XY" => (Format::Bc5, Linear, None),
+            _ if code.0 == HALF_FLOATS => (Format::Rgba16F, Linear, None),
+            letters if letters.iter().all(u8::is_ascii_graphic) => {
+                return Err(format!("format \"{}\"", String::from_utf8_lossy(letters)));
+            }
+            _ => return Err(format!("format {}", code.0)),
+        });
+    }
+    // Masks of whole bytes.
+    let byte = |mask: Option<u32>| match mask {
+        Some(0xff) => Some(0),
+        Some(0xff00) => Some(1),
+        Some(0xff_0000) => Some(2),
+        Some(0xff00_0000) => Some(3),
+        _ => None,
+    };
+    let rgb = [pixels.r_bit_mask, pixels.g_bit_mask, pixels.b_bit_mask].map(byte);
+    let alpha = pixels.a_bit_mask.filter(|mask| *mask != 0);
+    match rgb {
+        [Some(r), Some(g), Some(b)]
+            if pixels.flags.contains(PixelFormatFlags::RGB)
+                && pixels.rgb_bit_count == Some(32)
+                && alpha.is_none_or(|mask| byte(Some(mask)).is_some()) =>
+        {
+            Ok((Format::Rgba8, Unsaid, Some([Some(r), Some(g), Some(b), byte(alpha)])))
+        }
+        _ => Err(match pixels.rgb_bit_count {
+            Some(bits) => format!("a plain format of {bits} bits a texel"),
+            None => "a format without a name".into(),
+        }),
+    }
 }

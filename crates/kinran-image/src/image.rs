@@ -1,4 +1,4 @@
-use crate::Error;
+use crate::{Error, Transfer};
 
 /// The longest side of an image or a texture, in texels: twice the largest any GPU samples (16384).
 pub const MAX_SIDE: u32 = 32768;
@@ -26,8 +26,8 @@ impl Channels {
     }
 }
 
-/// The samples of an [`Image`], row by row from the top, channels interleaved, as they are stored in the
-/// file: integers are unsigned normalised, floats are unbounded. Nothing has been linearised.
+/// The samples of an [`Image`], row by row from the top, channels interleaved: integers are unsigned normalised, floats
+/// are unbounded. Nothing has been linearised, nothing is multiplied by alpha.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pixels {
     /// 8 bits a channel, 255 is one.
@@ -54,7 +54,7 @@ impl Pixels {
     }
 }
 
-/// One authored image, exactly as its file holds it.
+/// One authored image, as its file holds it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     /// Texels in a row, at least 1.
@@ -65,6 +65,11 @@ pub struct Image {
     pub channels: Channels,
     /// `width * height * channels` samples.
     pub pixels: Pixels,
+    /// How its red, green and blue are encoded if they are colour. Integers leave it open unless their file says it, and
+    /// colour is sRGB then; floats are linear unless their file says otherwise.
+    pub transfer: Transfer,
+    /// What was chosen or left out when the file was read, a part of a sentence each, for people.
+    pub notes: Vec<String>,
 }
 
 impl Image {
@@ -86,7 +91,16 @@ impl Image {
         if let Pixels::F32(samples) = &pixels {
             check_finite(width, channels, samples).map_err(Error::Unsupported)?;
         }
-        Ok(Image { width, height, channels, pixels })
+        Ok(Image::of(width, height, channels, pixels))
+    }
+
+    /// An image of samples that were checked.
+    pub(crate) fn of(width: u32, height: u32, channels: Channels, pixels: Pixels) -> Image {
+        let transfer = match pixels {
+            Pixels::U8(_) | Pixels::U16(_) => Transfer::Unsaid,
+            Pixels::F32(_) => Transfer::Linear,
+        };
+        Image { width, height, channels, pixels, transfer, notes: Vec::new() }
     }
 
     /// The texel at `(x, y)` as RGBA: integers divided by their maximum, grey replicated to R, G and B,

@@ -25,14 +25,19 @@ use crate::{Error, Format, Level, Texture, Transfer};
 /// NUL, or the compression level is out of range.
 pub fn encode_ktx2(texture: &Texture, zstd: Option<i32>) -> Result<Vec<u8>, Error> {
     texture.check()?;
+    texture.check_transfer()?;
     if let Some(level) = zstd
         && !zstd::compression_level_range().contains(&level)
     {
         return Err(Error::Unsupported(format!("Zstandard has no compression level {level}; use 1 to 22")));
     }
     let format = ktx2_format(texture.format, texture.transfer);
-    let (descriptor, type_size) =
+    let (mut descriptor, type_size) =
         Basic::from_format(format).map_err(|e| Error::Unsupported(format!("{:?}: {e}", texture.format)))?;
+    // Linear maps are no colours.
+    if texture.transfer == Transfer::Linear {
+        descriptor.color_primaries = None;
+    }
     let key_values = key_value_data(&texture.metadata)?;
 
     // Lay out the sections: header, level index, descriptor, key/values, levels from the smallest up.
@@ -115,16 +120,16 @@ fn key_value_data(metadata: &BTreeMap<String, String>) -> Result<Vec<u8>, Error>
 }
 
 fn ktx2_format(format: Format, transfer: Transfer) -> ktx2::Format {
-    use Transfer::{Linear, Srgb};
+    use Transfer::Srgb;
     match (format, transfer) {
-        (Format::Bc1, Linear) => ktx2::Format::BC1_RGBA_UNORM_BLOCK,
         (Format::Bc1, Srgb) => ktx2::Format::BC1_RGBA_SRGB_BLOCK,
+        (Format::Bc1, _) => ktx2::Format::BC1_RGBA_UNORM_BLOCK,
         (Format::Bc4, _) => ktx2::Format::BC4_UNORM_BLOCK,
         (Format::Bc5, _) => ktx2::Format::BC5_UNORM_BLOCK,
-        (Format::Bc7, Linear) => ktx2::Format::BC7_UNORM_BLOCK,
         (Format::Bc7, Srgb) => ktx2::Format::BC7_SRGB_BLOCK,
-        (Format::Rgba8, Linear) => ktx2::Format::R8G8B8A8_UNORM,
+        (Format::Bc7, _) => ktx2::Format::BC7_UNORM_BLOCK,
         (Format::Rgba8, Srgb) => ktx2::Format::R8G8B8A8_SRGB,
+        (Format::Rgba8, _) => ktx2::Format::R8G8B8A8_UNORM,
         (Format::Rgba16F, _) => ktx2::Format::R16G16B16A16_SFLOAT,
     }
 }

@@ -1,17 +1,29 @@
-//! Image files in: PNG, JPEG, TGA, TIFF, Radiance HDR and OpenEXR, samples exactly as stored.
+//! Image files in: PNG, JPEG, TGA, BMP, WebP, TIFF, Radiance HDR, OpenEXR, and the largest level of KTX2 and DDS.
+
+mod exr;
+mod hdr;
+mod jpeg;
+mod tiff;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use exr::prelude::{FlatSamples, MetaData, ReadChannels, ReadLayers};
-use image::codecs::{hdr::HdrDecoder, png::PngDecoder, tga::TgaDecoder};
+use image::codecs::{bmp::BmpDecoder, png::PngDecoder, tga::TgaDecoder, webp::WebPDecoder};
+use image::metadata::Orientation;
 use image::{ColorType, ImageDecoder, ImageError, Limits};
-use tiff::decoder::DecodingResult;
-use zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions};
 
 use crate::image::{MAX_IMAGE_BYTES, MAX_SIDE, check_finite, check_sides};
-use crate::{Channels, Error, Image, Pixels};
+use crate::{Channels, Error, Image, Pixels, decode_texture};
+
+/// Extensions of the files that [`read_image`] reads, in lower case.
+pub const IMAGE_EXTENSIONS: [&str; 14] =
+    ["png", "jpg", "jpeg", "jpe", "jfif", "tga", "bmp", "webp", "tif", "tiff", "hdr", "exr", "ktx2", "dds"];
+
+/// Whether a file's name ends in one of [`IMAGE_EXTENSIONS`], in upper or lower case.
+pub fn has_image_extension(path: &Path) -> bool {
+    path.extension().is_some_and(|own| IMAGE_EXTENSIONS.iter().any(|known| own.eq_ignore_ascii_case(known)))
+}
 
 /// The most texels' bytes that one stored byte can honestly stand for. Deflate reaches 1032; a 1-bit
 /// palette expands each of those bytes to 8 RGBA texels, 33024 in all. A header that claims more lies.
@@ -20,26 +32,40 @@ const MAX_EXPANSION: u64 = 65536;
 /// Reads an image file. The format is told by the content; TGA, which cannot be told, by the extension.
 ///
 /// 8- and 16-bit samples stay as they are (smaller ones and palettes are expanded to 8 bits), floats and
-/// half floats become `f32`. Nothing is linearised, premultiplied or rotated.
+/// half floats become `f32`. Nothing is linearised, nor turned for display, but TIFF's `Orientation`, which says how it is
+/// stored, is heeded; how colour is encoded stands in [`Image::transfer`].
+/// Colours that a file holds multiplied by their alpha (EXR always, TIFF where it says so) are divided by it again,
+/// 8 bits becoming 16; where alpha is 0 they stay.
 ///
 /// | format | read | refused, by name |
 /// |---|---|---|
 /// | PNG | all of it; the first frame of an animation | |
 /// | JPEG | 8-bit grey and colour, baseline and progressive | CMYK, 12-bit, arithmetic-coded |
 /// | TGA | grey, colour, palette, run lengths | |
+/// | BMP | all that Windows writes | |
+/// | WebP | lossy and lossless; the first frame of an animation | |
 /// | TIFF | grey or RGB, with or without alpha, 8 or 16 bits, half or float; the first page | CMYK, palette, Lab, separate planes |
-/// | HDR | RGBE | |
-/// | EXR | the first flat layer's Y, or R, G, B, with or without A | deep data, subsampled channels, DWA compression |
+/// | HDR | RGBE, rows from the top | XYZE, other orientations |
+/// | EXR | R, G, B, or X, Y, Z, or Y or a single channel, with or without A, of one layer; all compressions, DWA too | deep data, subsampled channels, several layers of which none is meant more than another |
+/// | KTX2, DDS | the largest level of what [`decode_texture`] reads; of two channels, which are normals, the third is rebuilt | |
 ///
 /// # Errors
 /// [`Error::Io`] where the file cannot be opened, [`Error::Malformed`] where its content is not a whole
 /// image, has a side above [`MAX_SIDE`] or more than [`MAX_IMAGE_BYTES`], or holds NaN or an infinity.
 pub fn read_image(path: &Path) -> Result<Image, Error> {
+    read_layer(path, None)
+}
+
+/// Reads an image file, of an EXR the layer that is called so, as [`read_image`]'s errors and notes call it.
+///
+/// # Errors
+/// As [`read_image`]; and where `layer` is given, that the file has no such layer or is of a format without layers.
+pub fn read_layer(path: &Path, layer: Option<&str>) -> Result<Image, Error> {
     let file = File::open(path).map_err(|e| Error::io(path, e))?;
     if file.metadata().map_err(|e| Error::io(path, e))?.is_dir() {
         return Err(Error::io(path, std::io::ErrorKind::IsADirectory.into()));
     }
-    decode(path, BufReader::with_capacity(1 << 16, file))
+    decode(path, BufReader::with_capacity(1 << 16, file), layer)
 }
 
 /// Decodes an image file that is in memory already; `name` stands for it in errors, and its extension
@@ -48,58 +74,77 @@ pub fn read_image(path: &Path) -> Result<Image, Error> {
 /// # Errors
 /// As [`read_image`].
 pub fn decode_image(name: &Path, bytes: &[u8]) -> Result<Image, Error> {
-    decode(name, Cursor::new(bytes))
+    decode(name, Cursor::new(bytes), None)
 }
 
-fn decode<R: BufRead + Seek + Send>(name: &Path, mut file: R) -> Result<Image, Error> {
+fn decode<R: BufRead + Seek + Send>(name: &Path, mut file: R, layer: Option<&str>) -> Result<Image, Error> {
     let size = file.seek(SeekFrom::End(0)).map_err(|e| Error::io(name, e))?;
     file.rewind().map_err(|e| Error::io(name, e))?;
     let mut magic = Vec::new();
     file.by_ref().take(16).read_to_end(&mut magic).map_err(|e| Error::io(name, e))?;
     file.rewind().map_err(|e| Error::io(name, e))?;
 
-    if magic.is_empty() {
-        return Err(Error::malformed(name, "the file is empty"));
+    let is_exr = magic.starts_with(&[0x76, 0x2f, 0x31, 0x01]);
+    if let Some(layer) = layer.filter(|_| !is_exr) {
+        return Err(Error::malformed(
+            name,
+            format!("only EXR has layers, so there is no \"{layer}\"; leave --exr-layer out"),
+        ));
     }
     let image = match magic.as_slice() {
+        [] => return Err(Error::malformed(name, "the file is empty")),
         [0x89, b'P', b'N', b'G', ..] => {
             let mut limits = Limits::no_limits();
             limits.max_alloc = Some(MAX_IMAGE_BYTES);
-            PngDecoder::with_limits(file, limits)
-                .map_err(|e| image_error(&e))
-                .and_then(|decoder| decode_samples(decoder, size))
-                .map_err(|e| ("PNG", e))
+            ("PNG", decode_with(PngDecoder::with_limits(file, limits), size))
         }
-        [0xff, 0xd8, 0xff, ..] => decode_jpeg(file, size).map_err(|e| ("JPEG", e)),
-        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => {
-            decode_tiff(file, size).map_err(|e| ("TIFF", e))
+        [0xff, 0xd8, 0xff, ..] => ("JPEG", jpeg::decode(file, size)),
+        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => ("TIFF", tiff::decode(file, size)),
+        [b'#', b'?', ..] => ("HDR", hdr::decode(file, size)),
+        _ if is_exr => ("EXR", exr::decode(file, size, layer)),
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => {
+            // No bound by the file's bytes: a picture of one colour takes none for its texels, of any size. The longest
+            // side is 16384, so no header asks for more than 1 GiB.
+            ("WebP", check_riff(&magic, size).and_then(|()| decode_with(WebPDecoder::new(file), u64::MAX)))
         }
-        [b'#', b'?', ..] => HdrDecoder::new_nonstrict(file)
-            .map_err(|e| image_error(&e))
-            .and_then(|decoder| decode_samples(decoder, size))
-            .map_err(|e| ("HDR", e)),
-        [0x76, 0x2f, 0x31, 0x01, ..] => decode_exr(file, size).map_err(|e| ("EXR", e)),
-        _ if name.extension().is_some_and(|e| e.eq_ignore_ascii_case("tga")) => TgaDecoder::new(file)
-            .map_err(|e| image_error(&e))
-            .and_then(|decoder| decode_samples(decoder, size))
-            .map_err(|e| ("TGA", e)),
+        [b'D', b'D', b'S', b' ', ..] | [0xab, b'K', b'T', b'X', b' ', b'2', b'0', ..] => {
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).map_err(|e| Error::io(name, e))?;
+            return decode_texture(name, &bytes)?.to_image();
+        }
+        _ if name.extension().is_some_and(|e| e.eq_ignore_ascii_case("tga")) => {
+            ("TGA", decode_with(TgaDecoder::new(file), size))
+        }
+        [b'B', b'M', ..] => ("BMP", decode_with(BmpDecoder::new(file), size)),
         _ => return Err(Error::malformed(name, unknown_format(&magic))),
     };
-    image.map_err(|(format, reason)| Error::malformed(name, format!("{format}: {reason}")))
+    let (format, image) = image;
+    image.map_err(|reason| Error::malformed(name, format!("{format}: {reason}")))
 }
 
 /// What to say of a file that is none of our formats.
 fn unknown_format(magic: &[u8]) -> String {
     let other = match magic {
-        [0xab, b'K', b'T', b'X', ..] | [b'D', b'D', b'S', b' ', ..] => "an engine texture (KTX or DDS)",
-        [b'R', b'I', b'F', b'F', ..] => "WebP",
-        [b'B', b'M', ..] => "BMP",
+        [0xab, b'K', b'T', b'X', ..] => "a texture in KTX 1",
         [b'G', b'I', b'F', b'8', ..] => "GIF",
         [b'8', b'B', b'P', b'S', ..] => "a Photoshop document",
         [_, _, _, _, b'f', b't', b'y', b'p', ..] => "AVIF or HEIF",
+        [0xff, 0x0a, ..] | [0, 0, 0, 12, b'J', b'X', b'L', ..] => "JPEG XL",
+        [0, 0, 0, 12, b'j', b'P', ..] => "JPEG 2000",
         _ => "of no format known here",
     };
-    format!("the file is {other}; images are read from PNG, JPEG, TGA, TIFF, HDR and EXR, save it as one")
+    format!(
+        "the file is {other}; images are read from PNG, JPEG, TGA, BMP, WebP, TIFF, HDR, EXR, KTX2 and DDS, save it as one"
+    )
+}
+
+/// Refuses a WebP file that is shorter than its first chunk says: the decoder fills what a truncated one lacks.
+fn check_riff(magic: &[u8], stored: u64) -> Result<(), String> {
+    let length = magic.get(4..8).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes);
+    if stored < u64::from(length) + 8 {
+        return Err("the file ends too early, it is truncated".into());
+    }
+    Ok(())
 }
 
 /// Refuses a header's claims before memory is spent on them.
@@ -148,8 +193,12 @@ fn plain(message: &str) -> String {
     }
 }
 
+fn decode_with<D: ImageDecoder>(decoder: Result<D, ImageError>, stored: u64) -> Result<Image, String> {
+    decoder.map_err(|e| image_error(&e)).and_then(|decoder| decode_samples(decoder, stored))
+}
+
 /// Decodes straight into the vector that the image keeps.
-fn decode_samples(decoder: impl ImageDecoder, stored: u64) -> Result<Image, String> {
+fn decode_samples(mut decoder: impl ImageDecoder, stored: u64) -> Result<Image, String> {
     let (width, height) = decoder.dimensions();
     let color = decoder.color_type();
     check_claims(width, height, u64::from(color.bytes_per_pixel()), stored)?;
@@ -159,6 +208,7 @@ fn decode_samples(decoder: impl ImageDecoder, stored: u64) -> Result<Image, Stri
         3 => Channels::Rgb,
         _ => Channels::Rgba,
     };
+    let note = turn_note(decoder.orientation().ok());
     let samples = width as usize * height as usize * channels.count();
     let pixels = match color {
         ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
@@ -177,7 +227,15 @@ fn decode_samples(decoder: impl ImageDecoder, stored: u64) -> Result<Image, Stri
             return Err(format!("samples of type {other:?} are not read; save it as an 8- or 16-bit PNG"));
         }
     };
-    finite_image(width, height, channels, pixels.map_err(|e| image_error(&e))?)
+    let mut image = finite_image(width, height, channels, pixels.map_err(|e| image_error(&e))?)?;
+    image.notes.extend(note);
+    Ok(image)
+}
+
+/// What is said of an image that is to be turned when it is shown: engines and glTF do not, so maps are not.
+fn turn_note(orientation: Option<Orientation>) -> Option<String> {
+    let turned = orientation.is_some_and(|orientation| orientation != Orientation::NoTransforms);
+    turned.then(|| "its EXIF data ask to turn it for display; it is taken as stored".into())
 }
 
 /// The decoders' last check, without [`Image::new`]'s checks of what is already known.
@@ -185,154 +243,47 @@ fn finite_image(width: u32, height: u32, channels: Channels, pixels: Pixels) -> 
     if let Pixels::F32(samples) = &pixels {
         check_finite(width, channels, samples)?;
     }
-    Ok(Image { width, height, channels, pixels })
+    Ok(Image::of(width, height, channels, pixels))
 }
 
-fn decode_jpeg(mut file: impl Read, stored: u64) -> Result<Image, String> {
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).map_err(|e| e.to_string())?;
-
-    // The decoder fills what a truncated file lacks with grey, so the end marker is looked for here. The
-    // entropy-coded data cannot contain a marker, and an embedded thumbnail lies before the last scan.
-    let last = |marker: u8| bytes.windows(2).rposition(|w| w == [0xff, marker]);
-    let (start_of_scan, end_of_image) = (last(0xda), last(0xd9));
-    if start_of_scan.is_none() || end_of_image < start_of_scan {
-        return Err("the file ends too early, it is truncated".into());
+/// Divides colours by their alpha, where that is neither 0 nor 1; 8 bits become 16.
+fn unassociate(image: Image) -> Image {
+    fn divided(samples: &[u16], channels: usize) -> Vec<u16> {
+        let texel = |texel: &[u16]| {
+            let alpha = u64::from(texel[channels - 1]);
+            let color = |c: u16| {
+                if alpha == 0 { c } else { ((u64::from(c) * 65535 + alpha / 2) / alpha).min(65535) as u16 }
+            };
+            let mut out = [0; 4];
+            for (o, c) in out.iter_mut().zip(&texel[..channels - 1]) {
+                *o = color(*c);
+            }
+            out[channels - 1] = texel[channels - 1];
+            out
+        };
+        samples.chunks_exact(channels).flat_map(|t| texel(t).into_iter().take(channels)).collect()
     }
-
-    let options = DecoderOptions::default()
-        .set_strict_mode(false)
-        .set_max_width(MAX_SIDE as usize)
-        .set_max_height(MAX_SIDE as usize);
-    let mut decoder = zune_jpeg::JpegDecoder::new_with_options(ZCursor::new(&bytes), options);
-    let damaged = |e| format!("{e}; the file is damaged or of a rare kind, save it again as PNG");
-    decoder.decode_headers().map_err(damaged)?;
-    let (Some(info), Some(color)) = (decoder.info(), decoder.input_colorspace()) else {
-        return Err("the file has no header".into());
-    };
-    let (width, height) = (u32::from(info.width), u32::from(info.height));
-    let (channels, out) = match color {
-        ColorSpace::Luma => (Channels::R, ColorSpace::Luma),
-        ColorSpace::YCbCr | ColorSpace::RGB => (Channels::Rgb, ColorSpace::RGB),
-        other => return Err(format!("its colours are {other:?}, for print; convert it to RGB")),
-    };
-    check_claims(width, height, channels.count() as u64, stored)?;
-    decoder.set_options(options.jpeg_set_out_colorspace(out));
-    let mut samples = vec![0u8; width as usize * height as usize * channels.count()];
-    decoder.decode_into(&mut samples).map_err(damaged)?;
-    Ok(Image { width, height, channels, pixels: Pixels::U8(samples) })
-}
-
-fn decode_tiff(file: impl Read + Seek, stored: u64) -> Result<Image, String> {
-    let damaged = |e: tiff::TiffError| match e {
-        tiff::TiffError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
-            "the file ends too early, it is truncated".into()
+    let n = image.channels.count();
+    let pixels = match image.pixels {
+        _ if n % 2 == 1 => image.pixels,
+        Pixels::U8(v) => {
+            Pixels::U16(divided(&v.into_iter().map(|s| u16::from(s) * 257).collect::<Vec<_>>(), n))
         }
-        tiff::TiffError::UnsupportedError(e) => format!("{e}; save it as an 8- or 16-bit PNG"),
-        e => format!("{e}; the file is damaged"),
-    };
-    let mut limits = tiff::decoder::Limits::default();
-    limits.decoding_buffer_size = MAX_IMAGE_BYTES as usize;
-    // One strip may be the whole image.
-    limits.intermediate_buffer_size = MAX_IMAGE_BYTES as usize;
-    let mut decoder = tiff::decoder::Decoder::new(file).map_err(damaged)?.with_limits(limits);
-
-    let (width, height) = decoder.dimensions().map_err(damaged)?;
-    let color = decoder.colortype().map_err(damaged)?;
-    let (channels, bits) = match color {
-        tiff::ColorType::Gray(bits) => (Channels::R, bits),
-        tiff::ColorType::GrayA(bits) => (Channels::Rg, bits),
-        tiff::ColorType::RGB(bits) => (Channels::Rgb, bits),
-        tiff::ColorType::RGBA(bits) => (Channels::Rgba, bits),
-        other => return Err(format!("its colours are {other:?}; convert it to grey or RGB")),
-    };
-    let unsupported = || format!("{bits}-bit samples of this kind are not read; save 8, 16 or 32-bit float");
-    if ![8, 16, 32].contains(&bits) {
-        return Err(unsupported());
-    }
-    check_claims(width, height, channels.count() as u64 * u64::from(bits / 8), stored)?;
-    let layout = decoder.image_buffer_layout().map_err(damaged)?;
-    if layout.planes > 1 {
-        return Err("its channels are stored in separate planes; save it with interleaved channels".into());
-    }
-    let pixels = match decoder.read_image().map_err(damaged)? {
-        DecodingResult::U8(v) => Pixels::U8(v),
-        DecodingResult::U16(v) => Pixels::U16(v),
-        DecodingResult::F32(v) => Pixels::F32(v),
-        DecodingResult::F16(v) => Pixels::F32(v.into_iter().map(|h| h.to_f32()).collect()),
-        _ => return Err(unsupported()),
-    };
-    if pixels.len() != width as usize * height as usize * channels.count() {
-        return Err("it holds another number of samples than its header says".into());
-    }
-    finite_image(width, height, channels, pixels)
-}
-
-fn decode_exr(mut file: impl Read + Seek + Send, stored: u64) -> Result<Image, String> {
-    let damaged = |e: exr::error::Error| match e {
-        exr::error::Error::NotSupported(e) => {
-            format!("{e} is not supported; save it flat, with ZIP compression")
+        Pixels::U16(v) => Pixels::U16(divided(&v, n)),
+        Pixels::F32(mut v) => {
+            for texel in v.chunks_exact_mut(n) {
+                let alpha = texel[n - 1];
+                if alpha > 0.0 {
+                    for c in &mut texel[..n - 1] {
+                        // Over an alpha near 0 a quotient may be beyond all floats.
+                        *c = Some(*c / alpha).filter(|c| c.is_finite()).unwrap_or(*c);
+                    }
+                }
+            }
+            Pixels::F32(v)
         }
-        e => format!("{e}; the file is damaged or truncated"),
     };
-    let meta = MetaData::read_from_buffered(&mut file, false).map_err(damaged)?;
-    let Some(header) = meta.headers.iter().find(|h| !h.deep) else {
-        return Err("it holds deep data only; flatten it".into());
-    };
-    let side = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-    let (width, height) = (side(header.layer_size.width()), side(header.layer_size.height()));
-    let texel_bytes: usize = header.channels.list.iter().map(|c| c.sample_type.bytes_per_sample()).sum();
-    check_claims(width, height, texel_bytes as u64, stored)?;
-    if header.channels.list.iter().any(|c| (c.sampling.x(), c.sampling.y()) != (1, 1)) {
-        return Err("it has subsampled channels; save it as RGB".into());
-    }
-    let window = header.shared_attributes.display_window;
-    if (window.position, window.size) != (header.own_attributes.layer_position, header.layer_size) {
-        return Err("its data window is not its display window; crop or extend it to the picture".into());
-    }
-
-    file.rewind().map_err(|e| e.to_string())?;
-    let layer = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(file)
-        .map_err(damaged)?
-        .layer_data;
-    let (width, height) = (side(layer.size.width()), side(layer.size.height()));
-    check_sides(width, height)?;
-
-    // Pick the planes by the names they have in the wild: "R", "layer.R", "Y"; one alone may have any.
-    let list = &layer.channel_data.list;
-    let plane = |wanted: &str| {
-        list.iter().find(|c| {
-            let name = c.name.to_string();
-            name.rsplit('.').next().is_some_and(|last| last.eq_ignore_ascii_case(wanted))
-        })
-    };
-    let names = || list.iter().map(|c| c.name.to_string()).collect::<Vec<_>>().join(", ");
-    let mut planes = match (plane("R"), plane("G"), plane("B"), plane("Y")) {
-        (Some(r), Some(g), Some(b), _) => vec![r, g, b],
-        (None, None, None, Some(y)) => vec![y],
-        _ if list.len() == 1 => vec![&list[0]],
-        _ => return Err(format!("its channels are {}; wanted are R, G, B or Y, and A", names())),
-    };
-    planes.extend(plane("A").filter(|_| list.len() > 1));
-    let channels = [Channels::R, Channels::Rg, Channels::Rgb, Channels::Rgba][planes.len() - 1];
-
-    let n = planes.len();
-    let mut samples = vec![0f32; width as usize * height as usize * n];
-    for (c, plane) in planes.into_iter().enumerate() {
-        let texels = samples.iter_mut().skip(c).step_by(n);
-        match &plane.sample_data {
-            FlatSamples::F16(v) => texels.zip(v).for_each(|(s, h)| *s = h.to_f32()),
-            FlatSamples::F32(v) => texels.zip(v).for_each(|(s, f)| *s = *f),
-            FlatSamples::U32(_) => return Err(format!("channel {} holds integers, not floats", plane.name)),
-        }
-    }
-    finite_image(width, height, channels, Pixels::F32(samples))
+    Image { pixels, ..image }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
-use crate::image::check_sides;
-use crate::{Error, decode};
+use crate::image::{MAX_IMAGE_BYTES, check_sides};
+use crate::{Channels, Error, Image, Pixels, decode};
 
 /// The layout of a texture's bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -57,6 +57,20 @@ pub enum Transfer {
     Linear,
     /// sRGB-encoded colour, linearised by the sampler.
     Srgb,
+    /// The file does not say it: colour is sRGB, all else linear. In textures only of DDS files that are older than
+    /// DirectX 10 or typeless; none is written so.
+    Unsaid,
+}
+
+impl Transfer {
+    /// What it is for colour (`color`) or anything else.
+    pub fn of_content(self, color: bool) -> Transfer {
+        match self {
+            Transfer::Unsaid if color => Transfer::Srgb,
+            Transfer::Unsaid => Transfer::Linear,
+            said => said,
+        }
+    }
 }
 
 /// One mip level in a [`Texture`]'s format.
@@ -129,6 +143,16 @@ impl Texture {
         Ok(())
     }
 
+    /// Refuses a texture of which nobody said what its numbers mean, before it is written.
+    pub(crate) fn check_transfer(&self) -> Result<(), Error> {
+        if self.transfer == Transfer::Unsaid {
+            return Err(Error::Unsupported(
+                "nothing says whether the texture is sRGB; set its transfer, by Transfer::of_content".into(),
+            ));
+        }
+        Ok(())
+    }
+
     /// The texels of a level as a sampler without filtering reads them, but for the sRGB decoding, which
     /// is left to the caller. See [`decode`].
     ///
@@ -140,5 +164,39 @@ impl Texture {
             return Err(Error::Unsupported(format!("there is no level {level}, only {}", self.levels.len())));
         };
         decode(self.format, &l.data, l.width, l.height)
+    }
+
+    /// The largest level as an image: 8 bits for the formats that decode to them, else floats. BC5 holds normals and gets
+    /// its z back.
+    ///
+    /// # Errors
+    /// Those of [`Texture::check`] and [`Texture::decode_level`].
+    pub fn to_image(&self) -> Result<Image, Error> {
+        self.check()?;
+        let Level { width, height, .. } = self.levels[0];
+        if u64::from(width) * u64::from(height) * 16 > MAX_IMAGE_BYTES {
+            return Err(Error::Unsupported(format!(
+                "{width}x{height} texels are too many for an image of floats"
+            )));
+        }
+        let texels = self.decode_level(0)?;
+        let (channels, pixels) = match self.format {
+            Format::Bc1 | Format::Bc7 | Format::Rgba8 => {
+                // Exact: these decode to multiples of 1/255.
+                let bytes = texels.as_flattened().iter().map(|&x| (x * 255.0 + 0.5) as u8);
+                (Channels::Rgba, Pixels::U8(bytes.collect()))
+            }
+            Format::Bc4 => (Channels::R, Pixels::F32(texels.iter().map(|texel| texel[0]).collect())),
+            Format::Bc5 => {
+                let normals = texels.iter().flat_map(|&[r, g, ..]| {
+                    let (x, y) = (2.0 * r - 1.0, 2.0 * g - 1.0);
+                    [r, g, 0.5 + 0.5 * (1.0 - x * x - y * y).max(0.0).sqrt()]
+                });
+                (Channels::Rgb, Pixels::F32(normals.collect()))
+            }
+            Format::Rgba16F => (Channels::Rgba, Pixels::F32(texels.as_flattened().to_vec())),
+        };
+        let image = Image::new(width, height, channels, pixels)?;
+        Ok(Image { transfer: self.transfer, ..image })
     }
 }

@@ -171,8 +171,8 @@ fn encode_png_to(image: &Image, out: &mut impl Write) -> io::Result<()> {
         })
 }
 
-/// Writes a float image as EXR: 32-bit floats, ZIP compression, channels Y, YA, RGB or RGBA. Appears whole
-/// or not at all.
+/// Writes a float image as EXR: 32-bit floats, ZIP compression, channels Y, YA, RGB or RGBA, colours multiplied by their
+/// alpha as EXR has them. Appears whole or not at all.
 ///
 /// # Errors
 /// [`Error::Unsupported`] for integer samples, [`Error::Io`] as [`write_atomically`].
@@ -180,22 +180,38 @@ pub fn write_exr(path: &Path, image: &Image) -> Result<(), Error> {
     let Pixels::F32(samples) = &image.pixels else {
         return Err(Error::Unsupported("EXR is written from float samples; write PNG".into()));
     };
-    let mut bytes = Cursor::new(Vec::new());
-    encode_exr_to(image, samples, &mut bytes).map_err(|e| Error::io(path, e))?;
-    write_atomically(path, bytes.get_ref())
-}
-
-fn encode_exr_to(image: &Image, samples: &[f32], out: &mut (impl Write + Seek)) -> io::Result<()> {
     let names: &[&str] = match image.channels {
         Channels::R => &["Y"],
         Channels::Rg => &["Y", "A"],
         Channels::Rgb => &["R", "G", "B"],
         Channels::Rgba => &["R", "G", "B", "A"],
     };
-    let planes = names.iter().enumerate().map(|(c, &name)| {
-        let plane = samples.iter().skip(c).step_by(names.len()).copied().collect();
-        AnyChannel::new(name, FlatSamples::F32(plane))
-    });
+    let n = names.len();
+    let plane = |c: usize| {
+        let associated =
+            |texel: &[f32]| if n % 2 == 0 && c < n - 1 { texel[c] * texel[n - 1] } else { texel[c] };
+        samples.chunks_exact(n).map(associated).collect()
+    };
+    let planes = names.iter().enumerate().map(|(c, &name)| (name, plane(c))).collect();
+    write_exr_planes(path, (image.width, image.height), planes)
+}
+
+/// Writes channels of any names as EXR, as [`write_exr`] does; each of `width * height` floats.
+///
+/// # Errors
+/// [`Error::Io`] as [`write_atomically`].
+pub fn write_exr_planes(path: &Path, size: (u32, u32), planes: Vec<(&str, Vec<f32>)>) -> Result<(), Error> {
+    let mut bytes = Cursor::new(Vec::new());
+    encode_exr_to(size, planes, &mut bytes).map_err(|e| Error::io(path, e))?;
+    write_atomically(path, bytes.get_ref())
+}
+
+fn encode_exr_to(
+    size: (u32, u32),
+    planes: Vec<(&str, Vec<f32>)>,
+    out: &mut (impl Write + Seek),
+) -> io::Result<()> {
+    let planes = planes.into_iter().map(|(name, plane)| AnyChannel::new(name, FlatSamples::F32(plane)));
     // Increasing order, or the file would depend on which thread compresses first.
     let encoding = Encoding {
         compression: Compression::ZIP16,
@@ -203,7 +219,7 @@ fn encode_exr_to(image: &Image, samples: &[f32], out: &mut (impl Write + Seek)) 
         ..Encoding::SMALL_LOSSLESS
     };
     let layer = Layer::new(
-        (image.width as usize, image.height as usize),
+        (size.0 as usize, size.1 as usize),
         LayerAttributes::default(),
         encoding,
         AnyChannels::sort(planes.collect()),

@@ -9,8 +9,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use kinran_image::{
-    Channels, Error, Image, MAX_SIDE, Pixels, decode_image, encode_png, read_image, write_atomically,
-    write_atomically_with, write_exr, write_png,
+    Channels, Error, IMAGE_EXTENSIONS, Image, MAX_SIDE, Pixels, Transfer, decode_image, encode_png,
+    has_image_extension, read_image, read_layer, write_atomically, write_atomically_with, write_exr,
+    write_png,
 };
 use proptest::prelude::*;
 use sample_assets::sample_assets;
@@ -53,10 +54,18 @@ fn integer_images() -> Vec<Image> {
     images
 }
 
+/// Their alpha is a power of two, so that it can be multiplied and divided by exactly.
 fn float_images() -> Vec<Image> {
     CHANNELS
         .map(|channels| {
-            let floats = gradient(9, 6, channels).iter().map(|&v| (v as f32 - 30000.0) * 1.7e-3).collect();
+            let n = channels.count();
+            let mut floats: Vec<f32> =
+                gradient(9, 6, channels).iter().map(|&v| (v as f32 - 30000.0) * 1.7e-3).collect();
+            if n % 2 == 0 {
+                floats.iter_mut().skip(n - 1).step_by(n).enumerate().for_each(|(i, a)| {
+                    *a = [1.0, 0.5, 0.25, 2.0][i % 4];
+                });
+            }
             Image::new(9, 6, channels, Pixels::F32(floats)).unwrap()
         })
         .to_vec()
@@ -92,11 +101,21 @@ fn files_of_other_writers_have_the_texels_they_were_painted_with() {
         ("flat.hdr", 3, 4, 0.0),
         ("y_half.exr", 1, 4, 0.0),
         ("rgb_float.exr", 3, 4, 0.0),
-        ("rgba_half.exr", 4, 4, 0.0),
+        ("xyz.exr", 3, 4, 0.0),
+        ("only_layer.exr", 3, 4, 0.0),
+        ("grey_alpha.tif", 2, 1, 0.0),
         // Quality 95 without chroma subsampling: the quantisation step of the gradients' frequencies.
         ("baseline.jpg", 3, 1, 6.0),
         ("progressive.jpg", 3, 1, 6.0),
         ("grey.jpg", 1, 1, 6.0),
+        ("adobe_0.jpg", 3, 1, 6.0),
+        ("adobe_0_jfif.jpg", 3, 1, 6.0),
+        ("rgb.bmp", 3, 1, 0.0),
+        ("rgba.bmp", 3, 1, 0.0),
+        ("rgb.webp", 3, 1, 0.0),
+        ("rgba.webp", 4, 1, 0.0),
+        // Quality 100 and a matrix of its own: whites and blacks within the range of video.
+        ("lossy.webp", 3, 1, 12.0),
     ];
     for (name, channels, sample_bytes, tolerance) in cases {
         let image = read_image(&data(name)).unwrap();
@@ -124,9 +143,174 @@ fn files_of_other_writers_have_the_texels_they_were_painted_with() {
             }
         }
     }
+    // A palette of greys.
+    let grey = read_image(&data("grey.bmp")).unwrap();
+    assert_painted(&grey, "grey.bmp", 0.0, |p| [p[0], p[0], p[0]]);
     let one_bit = read_image(&data("one_bit.png")).unwrap();
     for (x, y) in (0..11).flat_map(|y| (0..13).map(move |x| (x, y))) {
         assert_eq!(one_bit.texel(x, y)[0], f32::from(u8::from(painted(x, y)[0] > 80)), "({x}, {y})");
+    }
+}
+
+/// Texels of an image as make.py paints them.
+fn assert_painted(image: &Image, name: &str, tolerance: f32, wanted: impl Fn([f32; 4]) -> [f32; 3]) {
+    let scale = if matches!(image.pixels, Pixels::F32(_)) { 1.0 } else { 255.0 };
+    for (x, y) in (0..11).flat_map(|y| (0..13).map(move |x| (x, y))) {
+        let wanted = wanted(painted(x, y).map(|v| v as f32));
+        let got = image.texel(x, y).map(|v| v * scale);
+        for c in 0..3 {
+            let error = (got[c] - wanted[c]).abs();
+            assert!(error <= tolerance, "{name} ({x}, {y}): wanted {wanted:?} got {got:?}");
+        }
+    }
+}
+
+#[test]
+fn colours_that_are_multiplied_by_alpha_are_divided_by_it() {
+    // The writer stored the painted floats as they are, which EXR takes for multiplied ones.
+    let image = read_image(&data("rgba_half.exr")).unwrap();
+    assert_painted(&image, "rgba_half.exr", 1e-4, |p| [p[0] / p[3], p[1] / p[3], p[2] / p[3]]);
+    assert_eq!(image.texel(3, 2)[3], painted(3, 2)[3] as f32);
+    // Alpha of 128 and more and half a step of rounding leave one step of colour.
+    let image = read_image(&data("associated.tif")).unwrap();
+    assert_painted(&image, "associated.tif", 1.0, |p| [p[0], p[1], p[2]]);
+    assert!(matches!(image.pixels, Pixels::U16(_)), "8 bits would round once more");
+    assert!((image.texel(3, 2)[3] * 255.0 - painted(3, 2)[3] as f32).abs() < 1e-4);
+    // Where alpha is 0 there is nothing to divide by.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.exr");
+    let planes = ["R", "G", "B", "A"].map(|name| (name, vec![if name == "A" { 0.0 } else { 0.25 }]));
+    kinran_image::write_exr_planes(&path, (1, 1), planes.to_vec()).unwrap();
+    assert_eq!(read_image(&path).unwrap().texel(0, 0), [0.25, 0.25, 0.25, 0.0]);
+}
+
+/// What is written multiplied by alpha is read back as it was, whatever reads it: the file holds the product.
+#[test]
+fn exr_files_hold_colours_multiplied_by_alpha() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.exr");
+    let image = Image::new(1, 1, Channels::Rgba, Pixels::F32(vec![0.5, 1.0, 2.0, 0.25])).unwrap();
+    write_exr(&path, &image).unwrap();
+    let bytes = exr::prelude::read_first_rgba_layer_from_file(
+        &path,
+        |_, _| [0.0f32; 4],
+        |texel: &mut [f32; 4], _, (r, g, b, a): (f32, f32, f32, f32)| *texel = [r, g, b, a],
+    )
+    .unwrap();
+    assert_eq!(bytes.layer_data.channel_data.pixels, [0.125, 0.25, 0.5, 0.25]);
+    assert_eq!(read_image(&path).unwrap(), image);
+}
+
+#[test]
+fn tiff_is_read_from_its_visual_top_left_and_exif_only_told() {
+    for orientation in 2..=8 {
+        let name = format!("orientation_{orientation}.tif");
+        let image = read_image(&data(&name)).unwrap();
+        assert_eq!((image.width, image.height), (13, 11), "{name}");
+        assert_painted(&image, &name, 0.0, |p| [p[0], p[1], p[2]]);
+    }
+    let image = read_image(&data("exif_turned.jpg")).unwrap();
+    assert_painted(&image, "exif_turned.jpg", 6.0, |p| [p[0], p[1], p[2]]);
+    assert_eq!(image.notes, ["its EXIF data ask to turn it for display; it is taken as stored"]);
+}
+
+#[test]
+fn channels_of_an_exr_come_from_one_layer() {
+    // The unnamed layer, though diffuse.B stands before R in the file and Z is there too.
+    let image = read_image(&data("layers.exr")).unwrap();
+    assert_painted(&image, "layers.exr", 0.0, |p| [p[0], p[1], p[2]]);
+    assert_eq!(image.notes, ["the layer without a name; left out: diffuse, Z"]);
+    let other = |p: [f32; 4]| [255.0 - p[0], 255.0 - p[1], 255.0 - p[2]];
+    let image = read_layer(&data("layers.exr"), Some("Diffuse")).unwrap();
+    assert_painted(&image, "layers.exr diffuse", 0.0, other);
+    assert_eq!(image.notes, ["layer \"diffuse\"; left out: one without a name (B, G, R, Z)"]);
+
+    let image = read_layer(&data("blender.exr"), Some("View.Normal")).unwrap();
+    assert_painted(&image, "blender.exr", 0.0, other);
+    assert_eq!(
+        image.notes,
+        ["layer \"View.Normal\"; X, Y, Z as red, green, blue; left out: View.Combined, View.Depth"]
+    );
+    let image = read_layer(&data("parts.exr"), Some("normal")).unwrap();
+    assert_painted(&image, "parts.exr", 0.0, other);
+    assert_eq!(image.notes, ["layer \"normal\"; X, Y, Z as red, green, blue; left out: color"]);
+    assert_eq!(read_image(&data("xyz.exr")).unwrap().notes, ["X, Y, Z as red, green, blue"]);
+    assert_eq!(read_image(&data("only_layer.exr")).unwrap().notes, ["layer \"normal\""]);
+    assert_eq!(read_image(&data("rgb_float.exr")).unwrap().notes, [""; 0]);
+}
+
+#[test]
+fn layers_that_cannot_be_told_apart_are_refused_with_their_names_and_the_flag() {
+    for (name, parts) in [
+        ("blender.exr", ["View.Combined", "View.Normal", "View.Depth", "--exr-layer"]),
+        ("parts.exr", ["color", "normal", "several", "--exr-layer"]),
+    ] {
+        let error = read_image(&data(name)).unwrap_err().to_string();
+        assert!(error.contains(name) && parts.iter().all(|part| error.contains(part)), "{error}");
+    }
+    for (name, layer, part) in [
+        ("blender.exr", "Specular", "View.Combined, View.Depth, View.Normal"),
+        ("rgb.png", "x", "only EXR has layers"),
+    ] {
+        let error = read_layer(&data(name), Some(layer)).unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains(layer) && error.contains(part), "{error}");
+    }
+}
+
+#[test]
+fn floats_are_linear_unless_their_file_says_otherwise() {
+    for (name, wanted) in [
+        ("rgb.png", Transfer::Unsaid),
+        ("baseline.jpg", Transfer::Unsaid),
+        ("grey_16.tif", Transfer::Unsaid),
+        ("grey_float.tif", Transfer::Linear),
+        ("flat.hdr", Transfer::Linear),
+        ("rgb_float.exr", Transfer::Linear),
+        ("acescg.exr", Transfer::Linear),
+        ("srgb.exr", Transfer::Srgb),
+    ] {
+        assert_eq!(read_image(&data(name)).unwrap().transfer, wanted, "{name}");
+    }
+    let notes = read_image(&data("acescg.exr")).unwrap().notes;
+    assert_eq!(notes, ["its colours are said to be \"lin_ap1_scene\"; they are taken as if of Rec. 709"]);
+}
+
+#[test]
+fn headers_of_hdr_files_are_refused_with_the_right_advice() {
+    let flat = std::fs::read(data("flat.hdr")).unwrap();
+    let text = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 11 +X 13\n";
+    assert!(flat.starts_with(text));
+    let with = |header: &str| {
+        let bytes = [header.as_bytes(), &flat[text.len()..]].concat();
+        decode_image(Path::new("sky.hdr"), &bytes)
+    };
+    for (header, parts) in [
+        ("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n+Y 11 +X 13\n", ["+Y 11 +X 13", "turn it round"]),
+        ("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n+X 13 -Y 11\n", ["+X 13 -Y 11", "turn it round"]),
+        ("#?RADIANCE\r\nFORMAT=32-bit_rle_rgbe\r\n\r\n-Y 11 +X 13\r\n", ["CR LF", "binary mode"]),
+        ("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 11 +X 13\n", ["XYZ", "save it as RGB"]),
+    ] {
+        let error = with(header).unwrap_err().to_string();
+        assert!(error.contains("sky.hdr") && parts.iter().all(|part| error.contains(part)), "{error}");
+    }
+    let image =
+        with("#?RADIANCE\nEXPOSURE=2.0\nFORMAT=32-bit_rle_rgbe\nEXPOSURE= 4\n\n-Y 11 +X 13\n").unwrap();
+    assert_painted(&image, "exposure", 0.0, |p| [p[0], p[1], p[2]]);
+    assert!(image.notes.len() == 1 && image.notes[0].contains("EXPOSURE 8"), "{:?}", image.notes);
+}
+
+#[test]
+fn every_extension_in_the_list_is_one_that_is_read() {
+    for extension in IMAGE_EXTENSIONS {
+        let upper = format!("a.b.{}", extension.to_uppercase());
+        assert!(has_image_extension(Path::new(&upper)), "{upper}");
+    }
+    for name in ["png", "a.psd", "a.png.txt", "a", ""] {
+        assert!(!has_image_extension(Path::new(name)), "{name}");
+    }
+    let jpeg = std::fs::read(data("baseline.jpg")).unwrap();
+    for name in ["x.jpe", "x.JFIF"] {
+        assert_eq!(decode_image(Path::new(name), &jpeg).unwrap().width, 13, "{name}");
     }
 }
 
@@ -242,9 +426,12 @@ fn headers_that_claim_absurd_sizes_are_refused() {
 fn files_of_no_known_format_are_refused_with_the_list_of_formats() {
     for (bytes, word) in [
         (&b""[..], "empty"),
-        (b"hello", "PNG, JPEG, TGA, TIFF, HDR and EXR"),
-        (b"RIFF\0\0\0\0WEBP", "WebP"),
-        (b"DDS ", "texture"),
+        (b"hello", "PNG, JPEG, TGA, BMP, WebP, TIFF, HDR, EXR, KTX2 and DDS"),
+        (b"GIF89a", "GIF"),
+        (b"\0\0\0\x20ftypavif", "AVIF"),
+        (b"\xff\x0a\0\0", "JPEG XL"),
+        (b"DDS ", "truncated"),
+        (b"RIFF\x20\0\0\0WEBPVP8 ", "truncated"),
     ] {
         let error = decode_image(Path::new("a/b.dat"), bytes).unwrap_err().to_string();
         assert!(error.contains("b.dat") && error.contains(word), "{error}");

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use kinran_image::{
-    Error, Format, Level, MAX_SIDE, Texture, Transfer, decode_texture, encode_dds, encode_ktx2,
-    full_level_count, level_size, read_texture, write_texture,
+    Channels, Error, Format, Level, MAX_SIDE, Texture, Transfer, decode_texture, encode_dds, encode_ktx2,
+    full_level_count, image_size, level_size, read_image, read_texture, write_texture,
 };
 use proptest::prelude::*;
 
@@ -133,8 +133,9 @@ fn ktx2_sections_lie_where_the_specification_wants_them() {
 /// Khronos Data Format 1.4, section 5, written out by hand; the numbers of a descriptor's words.
 #[test]
 fn ktx2_descriptors_are_those_of_the_data_format_specification() {
-    let block = |model: u32, transfer: u32| model | 1 << 8 | transfer << 16;
     let (linear, srgb) = (1, 2);
+    // Only colour has primaries, those of BT.709.
+    let block = |model: u32, transfer: u32| model | u32::from(transfer == srgb) << 8 | transfer << 16;
     let (four_by_four, single) = (0x0303, 0);
     // VkFormat, type size, model word, texel block, bytes of a block, samples as (word 0, lower, upper).
     let bc = |channel: u32, offset: u32, bits: u32| (channel << 24 | (bits - 1) << 16 | offset, 0, u32::MAX);
@@ -328,6 +329,152 @@ fn upside_down_and_unknown_textures_are_refused_with_the_reason() {
     ] {
         let error = decode_texture(Path::new("x.ktx2"), &file).unwrap_err().to_string();
         assert!(error.contains("x.ktx2") && error.contains(word), "{error}");
+    }
+}
+
+/// A DDS header from before DirectX 10: `pixels` are flags, FourCC, bits and the four masks.
+fn old_dds(pixels: (u32, &[u8; 4], u32, [u32; 4]), width: u32, height: u32, levels: u32) -> Vec<u8> {
+    let (flags, code, bits, masks) = pixels;
+    let mut words = vec![124, 0x1007 | 0x2_0000, height, width, 0, 0, levels];
+    words.extend([0; 11]);
+    words.extend([32, flags, u32::from_le_bytes(*code), bits]);
+    words.extend(masks);
+    words.extend([0x1000, 0, 0, 0, 0]);
+    assert_eq!(words.len() * 4, 124);
+    let mut bytes = b"DDS ".to_vec();
+    bytes.extend(words.into_iter().flat_map(u32::to_le_bytes));
+    bytes
+}
+
+/// A BC4 block of one value.
+fn bc4(value: u8) -> Vec<u8> {
+    vec![value, value, 0, 0, 0, 0, 0, 0]
+}
+
+#[test]
+fn dds_files_of_old_writers_are_read() {
+    let (red, green) = (200.0 / 255.0, 60.0 / 255.0);
+    let two = [bc4(200), bc4(60)].concat();
+    // 565: 0x8410 is 16, 32, 16.
+    let one = [0x10, 0x84, 0x10, 0x84, 0, 0, 0, 0].to_vec();
+    let grey = [132.0 / 255.0, 130.0 / 255.0, 132.0 / 255.0, 1.0];
+    let four = |code| (4, code, 0, [0; 4]);
+    let bgra = [0xff_0000, 0xff00, 0xff, 0xff00_0000];
+    let rgba = [0xff, 0xff00, 0xff_0000, 0xff00_0000];
+    let masked = |flags, masks| (flags, b"\0\0\0\0", 32, masks);
+    let texel = vec![51, 102, 153, 204];
+    for (name, pixels, block, format, transfer, wanted) in [
+        ("ATI2", four(b"ATI2"), &two, Format::Bc5, Transfer::Linear, [red, green, 0.0, 1.0]),
+        ("BC5U", four(b"BC5U"), &two, Format::Bc5, Transfer::Linear, [red, green, 0.0, 1.0]),
+        ("ATI1", four(b"ATI1"), &bc4(200), Format::Bc4, Transfer::Linear, [red, 0.0, 0.0, 1.0]),
+        ("BC4U", four(b"BC4U"), &bc4(200), Format::Bc4, Transfer::Linear, [red, 0.0, 0.0, 1.0]),
+        ("DXT1", four(b"DXT1"), &one, Format::Bc1, Transfer::Unsaid, grey),
+        ("BGRA", masked(0x41, bgra), &texel, Format::Rgba8, Transfer::Unsaid, [0.6, 0.4, 0.2, 0.8]),
+        ("BGRX", masked(0x40, bgra), &texel, Format::Rgba8, Transfer::Unsaid, [0.6, 0.4, 0.2, 1.0]),
+        ("RGBA", masked(0x41, rgba), &texel, Format::Rgba8, Transfer::Unsaid, [0.2, 0.4, 0.6, 0.8]),
+    ] {
+        let (width, height) = (8, 4);
+        let mut bytes = old_dds(pixels, width, height, 2);
+        let count: usize =
+            [(8, 4), (4, 2)].iter().map(|&(w, h)| format.level_bytes(w, h) / block.len()).sum();
+        bytes.extend(block.repeat(count));
+        let texture = decode_texture(Path::new(name), &bytes).unwrap();
+        assert_eq!((texture.format, texture.transfer, texture.levels.len()), (format, transfer, 2), "{name}");
+        for (got, wanted) in texture.decode_level(1).unwrap()[5].iter().zip(wanted) {
+            assert!((got - wanted).abs() < 1e-6, "{name}: wanted {wanted:?}, got {got}");
+        }
+        // Nobody said what it is, so it is not written as one or the other.
+        assert_eq!(encode_dds(&texture).is_err(), transfer == Transfer::Unsaid, "{name}");
+        assert_eq!(encode_ktx2(&texture, None).is_err(), transfer == Transfer::Unsaid, "{name}");
+        assert_eq!(
+            texture.transfer.of_content(true) == Transfer::Srgb,
+            transfer == Transfer::Unsaid,
+            "{name}"
+        );
+        assert_eq!(texture.transfer.of_content(false), Transfer::Linear, "{name}");
+        assert!(decode_texture(Path::new(name), &bytes[..bytes.len() - 1]).is_err(), "{name}, truncated");
+    }
+    for (pixels, word) in [
+        (four(b"DXT5"), "\"DXT5\""),
+        (four(&[116, 0, 0, 0]), "116"),
+        ((0x40, b"\0\0\0\0", 24, bgra), "24 bits"),
+        (masked(0x40, [0x3ff, 0xf_fc00, 0x3ff0_0000, 0]), "32 bits"),
+    ] {
+        let error = decode_texture(Path::new("x.dds"), &old_dds(pixels, 4, 4, 1)).unwrap_err().to_string();
+        assert!(error.contains("x.dds") && error.contains(word) && error.contains("convert"), "{error}");
+    }
+}
+
+#[test]
+fn typeless_dds_files_leave_colour_to_the_role() {
+    for (format, code, wanted) in [
+        (Format::Bc1, 70, Transfer::Unsaid),
+        (Format::Bc4, 79, Transfer::Linear),
+        (Format::Bc5, 82, Transfer::Linear),
+        (Format::Bc7, 97, Transfer::Unsaid),
+        (Format::Rgba8, 27, Transfer::Unsaid),
+    ] {
+        let before = texture(format, Transfer::Linear, 8, 8);
+        let mut bytes = encode_dds(&before).unwrap();
+        bytes[128..132].copy_from_slice(&u32::to_le_bytes(code));
+        let read = decode_texture(Path::new("x.dds"), &bytes).unwrap();
+        assert_eq!((read.transfer, read.levels), (wanted, before.levels), "{format:?}");
+    }
+}
+
+/// The data format descriptor's first word after its head: model, primaries, transfer, flags (Khronos Data Format 1.4,
+/// section 5).
+#[test]
+fn linear_ktx2_has_no_primaries_and_colour_has_those_of_rec_709() {
+    for format in FORMATS {
+        for transfer in [Transfer::Linear, Transfer::Srgb] {
+            if transfer == Transfer::Srgb && !format.has_srgb() {
+                continue;
+            }
+            let file = encode_ktx2(&texture(format, transfer, 8, 8), None).unwrap();
+            let descriptor = u32::from_le_bytes(file[48..52].try_into().unwrap()) as usize;
+            let (primaries, curve) = (file[descriptor + 13], file[descriptor + 14]);
+            let wanted = if transfer == Transfer::Srgb { (1, 2) } else { (0, 1) };
+            assert_eq!((primaries, curve), wanted, "{format:?} {transfer:?}");
+        }
+    }
+}
+
+#[test]
+fn textures_are_read_as_images_by_their_largest_level() {
+    let folder = tempfile::tempdir().unwrap();
+    for (format, channels) in [
+        (Format::Bc1, Channels::Rgba),
+        (Format::Bc4, Channels::R),
+        (Format::Bc5, Channels::Rgb),
+        (Format::Bc7, Channels::Rgba),
+        (Format::Rgba8, Channels::Rgba),
+    ] {
+        let transfer = if format.has_srgb() { Transfer::Srgb } else { Transfer::Linear };
+        let texture = texture(format, transfer, 13, 7);
+        for name in ["x.ktx2", "x.dds"] {
+            let path = folder.path().join(name);
+            write_texture(&path, &texture, None).unwrap();
+            assert_eq!(image_size(&path), Some((13, 7)), "{format:?} {name}");
+            let image = read_image(&path).unwrap();
+            assert_eq!((image.width, image.height), (13, 7), "{format:?} {name}");
+            assert_eq!((image.channels, image.transfer), (channels, transfer), "{format:?} {name}");
+            let texels = texture.decode_level(0).unwrap();
+            for (i, wanted) in texels.into_iter().enumerate() {
+                let got = image.texel(i as u32 % 13, i as u32 / 13);
+                let wanted = match format {
+                    Format::Bc4 => [wanted[0], wanted[0], wanted[0], 1.0],
+                    Format::Bc5 => {
+                        let n = [got[0], got[1], got[2]].map(|c| 2.0 * c - 1.0);
+                        let length = n.iter().map(|c| c * c).sum::<f32>();
+                        assert!(n[2] == 0.0 || (length - 1.0).abs() < 1e-5, "{n:?} has length {length}");
+                        [wanted[0], wanted[1], got[2], 1.0]
+                    }
+                    _ => wanted,
+                };
+                assert_eq!(got, wanted, "{format:?} {name}, texel {i}");
+            }
+        }
     }
 }
 

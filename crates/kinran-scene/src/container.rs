@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use base64::Engine;
+use kinran_image::IMAGE_EXTENSIONS;
 use percent_encoding::percent_decode_str;
 
 use crate::Error;
@@ -278,11 +279,8 @@ pub(crate) enum Purpose {
 /// Extensions of buffers: those that `application/gltf-buffer` is registered with.
 const BUFFER_EXTENSIONS: [&str; 3] = ["bin", "glbin", "glbuf"];
 
-/// Extensions of images: glTF's two, those of its extensions, and what `kinran_image` reads besides.
-const IMAGE_EXTENSIONS: [&str; 18] = [
-    "png", "jpg", "jpeg", "jpe", "jfif", "ktx2", "dds", "webp", "avif", "basis", "ktx", "bmp", "gif", "tga",
-    "tif", "tiff", "exr", "hdr",
-];
+/// Extensions of images that `kinran_image` does not read, those of glTF's extensions among them.
+const OTHER_IMAGES: [&str; 4] = ["avif", "basis", "ktx", "gif"];
 
 impl Purpose {
     /// Refuses a file that cannot be what it is named for. Its name must say it, so that no document gets a key or a
@@ -297,18 +295,21 @@ impl Purpose {
                 "the file \"{path}\" is no buffer by its name; buffers end in .{}",
                 BUFFER_EXTENSIONS.join(", .")
             )),
-            Purpose::Image if !is(&IMAGE_EXTENSIONS) && !is_image(bytes) => Err(format!(
-                "the file \"{path}\" is no image, neither by its name nor by its first bytes; name a PNG or JPEG"
-            )),
+            Purpose::Image if !is(&IMAGE_EXTENSIONS) && !is(&OTHER_IMAGES) && !is_image(bytes) => {
+                Err(format!(
+                    "the file \"{path}\" is no image, neither by its name nor by its first bytes; name a PNG or JPEG"
+                ))
+            }
             _ => Ok(()),
         }
     }
 }
 
-/// Whether bytes begin as PNG, JPEG, KTX2 or DDS do.
+/// Whether bytes begin as PNG, JPEG, WebP, KTX2 or DDS do.
 fn is_image(bytes: &[u8]) -> bool {
     let magic: [&[u8]; 4] = [b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\xabKTX 20\xbb", b"DDS "];
-    magic.iter().any(|magic| bytes.starts_with(magic))
+    let webp = bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP");
+    webp || magic.iter().any(|magic| bytes.starts_with(magic))
 }
 
 /// The bytes a URI points at; `what` names its place in the document.

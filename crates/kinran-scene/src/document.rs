@@ -15,6 +15,7 @@ use crate::compressed::{decompress, is_compressed};
 use crate::container::{
     Purpose, Refusal, Target, beside, fetch, folder_of, join, locate, parse_uri, read_regular_file, split,
 };
+use crate::load::WEBP;
 
 pub use mesh::Attribute;
 
@@ -288,14 +289,14 @@ impl Document {
         index(object.get(key)?.get("index")?)
     }
 
-    /// A texture's PNG or JPEG image; where it has none, that of an extension in [`TextureExtension`].
+    /// A texture's PNG or JPEG image; where it has none, that of `EXT_texture_webp` or of an extension in
+    /// [`TextureExtension`].
     pub fn texture_image(&self, texture: usize) -> Option<usize> {
         let texture = array(&self.json, "textures").get(texture)?;
         texture.get("source").and_then(index).or_else(|| {
             let extensions = texture.get("extensions")?;
-            [TextureExtension::Ktx2, TextureExtension::Dds]
-                .iter()
-                .find_map(|extension| index(extensions.get(extension.name())?.get("source")?))
+            let names = [WEBP, TextureExtension::Ktx2.name(), TextureExtension::Dds.name()];
+            names.iter().find_map(|name| index(extensions.get(name)?.get("source")?))
         })
     }
 
@@ -416,10 +417,15 @@ impl Document {
                 texture.insert(key.into(), value.clone());
             }
         }
-        if let Some(source) = source {
-            texture.insert("source".into(), source.into());
-        }
         let mut extensions = Object::new();
+        if let Some(source) = source {
+            // A WebP stands in its extension's place.
+            let webp = old.and_then(|old| old.get("extensions")?.get(WEBP));
+            match webp.filter(|webp| webp.get("source").and_then(index) == Some(source)) {
+                Some(webp) => extensions.insert(WEBP.into(), webp.clone()),
+                None => texture.insert("source".into(), source.into()),
+            };
+        }
         for (extension, image) in alternatives {
             extensions.insert(extension.name().into(), json!({ "source": image }));
             self.use_extension(extension.name(), false);

@@ -24,6 +24,9 @@ pub struct Environment {
     rows: Vec<f32>,
     /// For each row, probability of all texels left of each texel; `width + 1` numbers from 0 to 1.
     columns: Vec<f32>,
+    /// What was chosen when the image was read, or what its file says that is not heeded, a sentence each that names the
+    /// file.
+    pub notes: Vec<String>,
 }
 
 impl Environment {
@@ -53,7 +56,8 @@ impl Environment {
             Channels::Rgb => samples.chunks_exact(3).map(Vec3::from_slice).collect(),
             Channels::Rgba => samples.chunks_exact(4).map(Vec3::from_slice).collect(),
         };
-        Ok(Environment::new(width, radiance))
+        let notes = image.notes.iter().map(|note| format!("{}: {note}", path.display())).collect();
+        Ok(Environment { notes, ..Environment::new(width, radiance) })
     }
 
     /// An environment of `radiance(direction)` at the centre of every texel, `2 height` by `height`.
@@ -92,11 +96,11 @@ impl Environment {
             (0..height).into_par_iter().map(|y| cumulate((0..width).map(|x| mean(x, y)))).unzip();
         let solid_angles = (0..height).map(|y| row_solid_angle(y, height));
         let (rows, _) = cumulate(sums.iter().zip(solid_angles).map(|(sum, angle)| sum * angle));
-        if sums.iter().all(|&sum| sum == 0.0) {
-            let (rows, _) = cumulate((0..height).map(|y| row_solid_angle(y, height)));
-            return Environment { width, height, radiance, rows, columns: cumulated.concat() };
-        }
-        Environment { width, height, radiance, rows, columns: cumulated.concat() }
+        let rows = match sums.iter().all(|&sum| sum == 0.0) {
+            true => cumulate((0..height).map(|y| row_solid_angle(y, height))).0,
+            false => rows,
+        };
+        Environment { width, height, radiance, rows, columns: cumulated.concat(), notes: Vec::new() }
     }
 
     /// Texels in a row, twice [`Environment::height`].

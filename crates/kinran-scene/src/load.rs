@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, DVec4, Mat3, Quat, Vec2, Vec3, Vec4};
-use kinran_image::{Channels, Format, Image, Pixels, Texture};
+use kinran_image::{Image, Pixels, Texture, Transfer};
 use rayon::prelude::*;
 use serde::Deserialize;
 
@@ -27,7 +27,7 @@ use crate::{
 /// Extensions that may stand in `extensionsRequired`: those this module reads, and those that change how
 /// a surface looks but leave the rest of the document as it is; the latter are listed in
 /// [`Material::ignored_extensions`] or in [`Scene::warnings`].
-/// What images are in textures of `EXT_texture_avif` and `EXT_texture_webp` matters only to who needs them.
+/// What images are in textures of `EXT_texture_avif` matters only to who needs them.
 const ADMITTED_EXTENSIONS: [&str; 32] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -78,6 +78,9 @@ const READ_MATERIAL_EXTENSIONS: [&str; 9] = [
 
 /// Texture extensions that name a KTX2 or DDS file.
 const TEXTURE_EXTENSIONS: [&str; 2] = ["KHR_texture_basisu", "MSFT_texture_dds"];
+
+/// The texture extension that names a WebP file, beside a PNG or JPEG or without.
+pub(crate) const WEBP: &str = "EXT_texture_webp";
 
 /// Texels that all images of a scene may have together: four of 16384 by 16384, 4 GiB as RGBA8.
 const TEXELS_MAX: u64 = 1 << 30;
@@ -668,12 +671,14 @@ impl Loader<'_> {
             .iter()
             .find_map(|name| texture.extensions.get(*name)?.get("source")?.as_u64())
             .and_then(|source| usize::try_from(source).ok());
-        let Some(image) = texture.source.or(runtime) else {
+        let webp = texture.extensions.get(WEBP).and_then(|webp| webp.get("source")?.as_u64());
+        let webp = webp.and_then(|source| usize::try_from(source).ok());
+        let Some(image) = texture.source.or(webp).or(runtime) else {
             let names: Vec<&str> = texture.extensions.keys().map(String::as_str).collect();
             return Err(Error::unsupported(
                 self.name,
                 format!(
-                    "{what}: texture {} has no image that can be read (extensions: {}); give it a PNG or JPEG source",
+                    "{what}: texture {} has no image that can be read (extensions: {}); give it a PNG, JPEG or WebP source",
                     info.index,
                     if names.is_empty() { "none".into() } else { names.join(", ") }
                 ),
@@ -1303,12 +1308,11 @@ impl Loader<'_> {
     fn image(&self, index: usize, texels: &AtomicU64, resolve: &Resolver<'_>) -> Result<Image, Error> {
         let mut fetched = Vec::new();
         let (name, bytes) = self.image_bytes(index, &mut fetched, resolve)?;
-        let decoded = match bytes {
-            [b'D', b'D', b'S', b' ', ..] | [0xab, b'K', b'T', b'X', ..] => {
-                level_zero(&kinran_image::decode_texture(&name, bytes)?)?
-            }
-            _ => kinran_image::decode_image(&name, bytes)?,
-        };
+        let mut decoded = kinran_image::decode_image(&name, bytes)?;
+        if !matches!(decoded.pixels, Pixels::F32(_)) {
+            // glTF says by the slot what is colour, and that it is sRGB.
+            decoded.transfer = Transfer::Unsaid;
+        }
         let size = u64::from(decoded.width) * u64::from(decoded.height);
         if texels.fetch_add(size, Ordering::Relaxed) + size > TEXELS_MAX {
             return Err(Error::unsupported(
@@ -1318,32 +1322,6 @@ impl Loader<'_> {
         }
         Ok(decoded)
     }
-}
-
-/// The largest level of an engine texture as an image: 8 bits for the formats that decode to them, else
-/// floats. BC5 holds normals, the only thing in glTF that has two channels, and gets its z back.
-fn level_zero(texture: &Texture) -> Result<Image, Error> {
-    let Some(level) = texture.levels.first() else {
-        return Err(kinran_image::Error::Unsupported("a texture has no level".into()).into());
-    };
-    let texels = texture.decode_level(0)?;
-    let (channels, pixels) = match texture.format {
-        Format::Bc1 | Format::Bc7 | Format::Rgba8 => {
-            // Exact: these decode to multiples of 1/255.
-            let bytes = texels.as_flattened().iter().map(|&x| (x * 255.0 + 0.5) as u8);
-            (Channels::Rgba, Pixels::U8(bytes.collect()))
-        }
-        Format::Bc4 => (Channels::R, Pixels::F32(texels.iter().map(|texel| texel[0]).collect())),
-        Format::Bc5 => {
-            let normals = texels.iter().flat_map(|&[r, g, ..]| {
-                let (x, y) = (2.0 * r - 1.0, 2.0 * g - 1.0);
-                [r, g, 0.5 + 0.5 * (1.0 - x * x - y * y).max(0.0).sqrt()]
-            });
-            (Channels::Rgb, Pixels::F32(normals.collect()))
-        }
-        Format::Rgba16F => (Channels::Rgba, Pixels::F32(texels.as_flattened().to_vec())),
-    };
-    Ok(Image::new(level.width, level.height, channels, pixels)?)
 }
 
 /// The matrix of `KHR_texture_transform`, translation times rotation times scale.

@@ -47,8 +47,7 @@ fn flat_texture(format: Format, transfer: Transfer) -> Texture {
 
 /// Replaces the textures of every material by baked ones, as a baker would.
 fn bake(document: &mut Document, folder: &Path, alternatives: &[TextureExtension]) -> usize {
-    let fallback =
-        Image { width: 8, height: 8, channels: Channels::Rgb, pixels: Pixels::U8(vec![128; 8 * 8 * 3]) };
+    let fallback = Image::new(8, 8, Channels::Rgb, Pixels::U8(vec![128; 8 * 8 * 3])).unwrap();
     let mut replaced = 0;
     for material in 0..document.material_count() {
         for (slot, format, transfer) in [

@@ -202,11 +202,8 @@ fn samples_follow_luminance() {
 #[test]
 fn images_that_are_no_environments_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let image = |width, height, pixels| kinran_image::Image {
-        width,
-        height,
-        channels: kinran_image::Channels::Rgb,
-        pixels,
+    let image = |width, height, pixels| {
+        kinran_image::Image::new(width, height, kinran_image::Channels::Rgb, pixels).unwrap()
     };
     let square = folder.path().join("square.exr");
     let floats = kinran_image::Pixels::F32(vec![1.0; 4 * 4 * 3]);

@@ -17,12 +17,8 @@ fn everything() -> (Value, Vec<u8>) {
         json!({ "buffer": 0, "byteOffset": bin.len() - bytes.len(), "byteLength": bytes.len() })
     };
     let floats = |values: &[f32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
-    let image = kinran_image::Image {
-        width: 2,
-        height: 2,
-        channels: kinran_image::Channels::Rgb,
-        pixels: kinran_image::Pixels::U8((0..12).collect()),
-    };
+    let pixels = kinran_image::Pixels::U8((0..12).collect());
+    let image = kinran_image::Image::new(2, 2, kinran_image::Channels::Rgb, pixels).unwrap();
     let mut views = vec![
         // A unit square in the plane z = 0.
         view(&floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.])),
@@ -218,6 +214,37 @@ fn engine_textures_stand_in_for_missing_images() {
                 assert_eq!(samples[..3], [0.0, 0.0, 0.5], "{extension}");
             }
         }
+    }
+}
+
+/// A WebP alone, as optimisers leave it, and beside a PNG that is taken then.
+#[test]
+fn webp_textures_are_read_where_they_stand_alone() {
+    let webp = include_bytes!("../../kinran-image/tests/data/rgb.webp");
+    for alone in [true, false] {
+        let (mut json, mut bin) = everything();
+        bin.resize(bin.len().next_multiple_of(4), 0);
+        let view = json!({ "buffer": 0, "byteOffset": bin.len(), "byteLength": webp.len() });
+        bin.extend(webp);
+        json["buffers"][0]["byteLength"] = json!(bin.len());
+        let views = json["bufferViews"].as_array_mut().unwrap();
+        views.push(view);
+        let view = views.len() - 1;
+        let images = json["images"].as_array_mut().unwrap();
+        images.push(json!({ "bufferView": view, "mimeType": "image/webp" }));
+        let image = images.len() - 1;
+        let texture = &mut json["textures"][0];
+        texture["extensions"] = json!({ "EXT_texture_webp": { "source": image } });
+        if alone {
+            texture.as_object_mut().unwrap().remove("source");
+            json["extensionsRequired"] = json!(["EXT_texture_webp"]);
+        }
+        let scene = load(&glb(&json, &bin)).unwrap();
+        let read = scene.images[image].as_ref();
+        assert_eq!(read.map(|image| (image.width, image.height)), alone.then_some((13, 11)));
+        // Texel (3, 2) as it was painted: 3 * 12 + 2, 2 * 17, 255 - 3 * 12 - 2.
+        let texel = read.map(|image| image.texel(3, 2).map(|v| (v * 255.0).round()));
+        assert_eq!(texel, alone.then_some([38.0, 34.0, 217.0, 255.0]));
     }
 }
 

@@ -14,8 +14,8 @@ use clap::ValueEnum;
 use kinran_bake::aniso::{Filter, Kernel, Sheet, SurfaceOptions};
 use kinran_bake::folder::{FolderError, Green, Hints, Role as MapRole};
 use kinran_image::{
-    Encoder, Encoding, Format, Preset, Role, Texture, encode_dds, encode_ktx2, full_level_count, level_size,
-    write_atomically,
+    Encoder, Encoding, Format, Preset, Role, Texture, Transfer, encode_dds, encode_ktx2, full_level_count,
+    level_size, write_atomically,
 };
 use kinran_scene::{Wrap, is_gltf};
 
@@ -163,6 +163,14 @@ pub struct Args {
     #[arg(long)]
     pub normal_blue: bool,
 
+    /// How colour maps are encoded, whatever their files say; by default EXR, HDR and float TIFF are linear, others sRGB
+    #[arg(long, value_enum, value_name = "SPACE")]
+    pub color_space: Option<ColorSpace>,
+
+    /// Which layer of an EXR file holds the map; may be given again
+    #[arg(long, value_name = "FILE=LAYER", value_parser = exr_layer)]
+    pub exr_layer: Vec<(PathBuf, String)>,
+
     #[command(flatten)]
     #[allow(missing_docs)]
     pub model: ModelArgs,
@@ -183,6 +191,23 @@ fn map(text: &str) -> Result<(MapRole, PathBuf), String> {
         text.split_once('=').ok_or_else(|| format!("write ROLE=FILE; roles are {}", roles()))?;
     let role = MapRole::all().find(|r| r.name() == role);
     role.map(|role| (role, PathBuf::from(file))).ok_or_else(|| format!("roles are {}", roles()))
+}
+
+/// `FILE=LAYER`.
+fn exr_layer(text: &str) -> Result<(PathBuf, String), String> {
+    match text.rsplit_once('=') {
+        Some((file, layer)) if !file.is_empty() && !layer.is_empty() => Ok((file.into(), layer.into())),
+        _ => Err("write FILE=LAYER, such as render.exr=View.Normal".into()),
+    }
+}
+
+/// How colour is encoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ColorSpace {
+    /// In proportion to light
+    Linear,
+    /// By the sRGB curve
+    Srgb,
 }
 
 /// Shape of a footprint.
@@ -311,6 +336,11 @@ impl Args {
             anisotropy: self.anisotropy,
             force_normal: self.force_normal,
             normal_blue: self.normal_blue,
+            color_space: self.color_space.map(|space| match space {
+                ColorSpace::Linear => Transfer::Linear,
+                ColorSpace::Srgb => Transfer::Srgb,
+            }),
+            layers: self.exr_layer.clone(),
             wrap: self.wrap(),
         }
     }

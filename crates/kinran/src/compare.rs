@@ -304,7 +304,8 @@ pub fn compare(
     };
 
     let (surfaces, apart) = scene_surfaces(scene, Mips::Level0, progress)?;
-    let warnings = scene.warnings.iter().cloned().chain(apart).collect();
+    let told = scene.warnings.iter().chain(options.view.environment_notes()).cloned();
+    let warnings = told.chain(apart).collect();
     let mut prepared = options.view.scene(scene, surfaces)?;
     let mut truth = Vec::new();
     let mut drawn: Vec<Vec<Taken>> = vec![Vec::new(); options.filters.len()];

@@ -223,7 +223,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let (surfaces, apart) = scene_surfaces(&scene, mips, &progress)?;
     let prepared = view.scene(&scene, surfaces)?;
     let left_out = painter.left_out(&view, &prepared);
-    let warnings: Vec<String> = scene.warnings.iter().cloned().chain(apart).chain(left_out).collect();
+    let told = scene.warnings.iter().chain(view.environment_notes()).cloned();
+    let warnings: Vec<String> = told.chain(apart).chain(left_out).collect();
     warnings.iter().for_each(|w| console.warn(w));
     let plain = args.view.light.is_empty()
         && scene.lights.is_empty()
@@ -498,8 +499,8 @@ fn direction_map(direction: Direction, tilt: f32) -> Option<BoundTexture> {
         let t = fibre(vec2((i % SIZE) as f32, (i / SIZE) as f32) / SIZE as f32);
         (t * 0.5 + 0.5).to_array()
     });
-    let image =
-        Image { width: SIZE, height: SIZE, channels: Channels::Rgb, pixels: Pixels::F32(texels.collect()) };
+    let image = Image::new(SIZE, SIZE, Channels::Rgb, Pixels::F32(texels.collect()))
+        .expect("finite directions, three for each texel");
     let texture = MipTexture::from_image(&image, Transfer::Linear, [Wrap::Repeat; 2]);
     Some(BoundTexture { texture: Arc::new(texture), ..BoundTexture::constant([0.5, 0.5, 1.0, 1.0]) })
 }

@@ -121,8 +121,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     }
     let drawn = if only_baked { Mips::Baked } else { mips };
     let (surfaces, apart) = scene_surfaces(&scene, drawn, &progress)?;
-    let warnings: Vec<String> =
-        scene.warnings.iter().cloned().chain(apart).chain(missing_curvature(&scene)).collect();
+    let told = scene.warnings.iter().chain(view.environment_notes()).cloned();
+    let warnings: Vec<String> = told.chain(apart).chain(missing_curvature(&scene)).collect();
     warnings.iter().for_each(|w| console.warn(w));
 
     let filtering = match mips {

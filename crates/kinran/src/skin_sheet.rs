@@ -166,7 +166,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
 
     let mut view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
     let (surfaces, apart) = scene_surfaces(&scene, Mips::Filtered(Filter::Linear), &progress)?;
-    warnings.extend(apart);
+    warnings.extend(view.environment_notes().cloned().chain(apart));
     warnings.iter().for_each(|w| console.warn(w));
     let preparing = progress.busy("preparing the scene");
     let mut prepared = view.scene(&scene, surfaces)?;

@@ -288,6 +288,11 @@ impl View {
         Ok(View { camera: view.camera_at(args.distance), ..view })
     }
 
+    /// What is to be said of the environment's file.
+    pub fn environment_notes(&self) -> impl Iterator<Item = &String> {
+        self.environment.iter().flat_map(|environment| &environment.notes)
+    }
+
     /// The camera, moved away from the model's middle by `factor`.
     pub fn camera_at(&self, factor: f32) -> Camera {
         let position = Vec3::from(self.camera.transform.translation);
@@ -436,7 +441,10 @@ fn turned(environment: Environment, degrees: f32) -> Environment {
         return environment;
     }
     let back = Mat3::from_rotation_y(-degrees.to_radians());
-    Environment::from_fn(environment.height(), |direction| environment.radiance(back * direction))
+    let mut turned =
+        Environment::from_fn(environment.height(), |direction| environment.radiance(back * direction));
+    turned.notes = environment.notes;
+    turned
 }
 
 /// A file's name without its folder, as it stands in reports.

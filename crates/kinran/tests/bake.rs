@@ -791,14 +791,14 @@ fn what_a_bake_does_not_need_stops_it() {
     document["textures"].as_array_mut().unwrap().extend([
         json!({ "source": 2 }),
         json!({ "source": 3 }),
-        json!({ "extensions": { "EXT_texture_webp": { "source": 3 } } }),
+        json!({ "extensions": { "EXT_texture_avif": { "source": 3 } } }),
     ]);
     document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({ "index": 2 });
     document["materials"][0]["emissiveTexture"] = json!({ "index": 3 });
     document["materials"][0]["extensions"]["KHR_materials_sheen"] =
         json!({ "sheenColorFactor": [1, 1, 1], "sheenColorTexture": { "index": 4 } });
     document["accessors"][0]["componentType"] = json!(1);
-    document["extensionsRequired"] = json!(["EXT_texture_webp"]);
+    document["extensionsRequired"] = json!(["EXT_texture_avif"]);
     std::fs::write(&model, serde_json::to_vec(&document).unwrap()).unwrap();
     let out = tempfile::tempdir().unwrap();
     let report = kinran_json(&["bake", text(&model), "-o", text(out.path())]);
@@ -817,6 +817,136 @@ fn what_a_bake_does_not_need_stops_it() {
     assert!(out.path().join("cut.png").exists(), "a file that is not read is still copied");
     // Asked for, they are.
     refused(&["bake", text(&model), "-o", text(out.path()), "--all-textures"], &["square.gltf"]);
+}
+
+/// Half the light in an EXR is code 188, half of sRGB's range 128; said in the table, the sidecar and a dry run.
+#[test]
+fn linear_colour_is_told_and_a_flag_or_a_manifest_overrides_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let material = folder.path().join("paint");
+    std::fs::create_dir(&material).unwrap();
+    let grey = Image::new(4, 4, Channels::Rgb, Pixels::F32(vec![0.5; 48])).unwrap();
+    kinran_image::write_exr(&material.join("paint_color.exr"), &grey).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let texel = |out: &Path| {
+        let texture = read_texture(&out.join("paint_color.ktx2")).unwrap();
+        assert_eq!(texture.transfer, Transfer::Srgb);
+        texture.levels[0].data[0]
+    };
+    let words = ["bake", text(&material), "-o", text(out.path()), "--color-format", "rgba8"];
+    for (flags, wanted, said) in [
+        (&[][..], 188, "taken as linear; say --color-space srgb if it is not"),
+        (&["--color-space", "srgb"], 128, "sRGB, by --color-space"),
+        (&["--color-space", "linear"], 188, "linear, by --color-space"),
+    ] {
+        let dry = kinran_json(&[&words[..], flags, &["--dry-run"]].concat());
+        let report = kinran_json(&[&words[..], flags].concat());
+        for report in [&dry, &report] {
+            assert_eq!(report["files"][0]["note"], said, "{flags:?}");
+        }
+        assert_eq!(report["surfaces"][0]["inputs"][0]["notes"], json!([said]), "{flags:?}");
+        assert!(
+            texel(out.path()).abs_diff(wanted) <= 1,
+            "{flags:?}: wanted {wanted}, got {}",
+            texel(out.path())
+        );
+    }
+    refused(&[&words[..], &["--color-space", "rec2020"]].concat(), &["--color-space", "linear, srgb"]);
+
+    let manifest = folder.path().join("kinran.toml");
+    let entry = "[[aniso]]\ninput = \"paint\"\ncolor-space = \"srgb\"\ncolor-format = \"rgba8\"\n";
+    std::fs::write(&manifest, entry).unwrap();
+    let cache = folder.path().join("cache");
+    kinran_json(&["bake", text(&manifest), "--cache", text(&cache)]);
+    let baked = folder.path().join("baked/paint");
+    assert!(texel(&baked).abs_diff(128) <= 1, "by manifest: got {}", texel(&baked));
+}
+
+/// A render's layers as files of other programs have them: one is asked for, by a flag and in a manifest.
+#[test]
+fn layers_of_an_exr_are_named_by_a_flag_or_a_manifest() {
+    let folder = tempfile::tempdir().unwrap();
+    let material = folder.path().join("paint");
+    std::fs::create_dir(&material).unwrap();
+    let plane = |v: f32| vec![v; 16];
+    let planes = vec![
+        ("View.Color.R", plane(0.5)),
+        ("View.Color.G", plane(0.125)),
+        ("View.Color.B", plane(1.0)),
+        ("View.Normal.X", plane(0.0)),
+        ("View.Normal.Y", plane(0.0)),
+        ("View.Normal.Z", plane(1.0)),
+    ];
+    kinran_image::write_exr_planes(&material.join("paint_color.exr"), (4, 4), planes).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let words = ["bake", text(&material), "-o", text(out.path()), "--color-format", "rgba8"];
+    refused(&words, &["paint_color.exr", "View.Color, View.Normal", "--exr-layer"]);
+    refused(&[&words[..], &["--dry-run"]].concat(), &["paint_color.exr", "--exr-layer"]);
+    let layer = ["--exr-layer", "paint_color.exr=View.Color"];
+    let report = kinran_json(&[&words[..], &layer].concat());
+    let note = report["files"][0]["note"].as_str().unwrap();
+    assert!(note.starts_with("layer \"View.Color\"; left out: View.Normal; taken as linear"), "{note}");
+    let texel =
+        |out: &Path| read_texture(&out.join("paint_color.ktx2")).unwrap().levels[0].data[..3].to_vec();
+    assert_eq!(texel(out.path()), [188, 99, 255]);
+    refused(
+        &[&words[..], &["--exr-layer", "paint_color.exr=Depth"]].concat(),
+        &["no layer \"Depth\"", "View.Color"],
+    );
+    refused(&[&words[..], &["--exr-layer", "x.exr=Depth"]].concat(), &["--exr-layer x.exr=Depth"]);
+    refused(&[&words[..], &["--exr-layer", "Depth"]].concat(), &["FILE=LAYER"]);
+
+    let manifest = folder.path().join("kinran.toml");
+    let entry = "[[aniso]]\ninput = \"paint\"\nexr-layer = \"paint_color.exr=View.Color\"\ncolor-format = \"rgba8\"\n";
+    std::fs::write(&manifest, entry).unwrap();
+    kinran_json(&["bake", text(&manifest), "--cache", text(&folder.path().join("cache"))]);
+    assert_eq!(texel(&folder.path().join("baked/paint")), [188, 99, 255]);
+    // Inspect asks for one in the same way.
+    let file = material.join("paint_color.exr");
+    refused(&["inspect", text(&file)], &["View.Color, View.Normal", "--exr-layer"]);
+    let report = kinran_json(&["inspect", text(&file), "--exr-layer", "View.Normal"]);
+    assert_eq!(
+        report["notes"],
+        json!(["layer \"View.Normal\"; X, Y, Z as red, green, blue; left out: View.Color"])
+    );
+    assert_eq!(report["transfer"], "linear");
+}
+
+/// A WebP without a PNG beside it stays what its texture names by the extension; `source` would not be glTF.
+#[test]
+fn webp_textures_of_a_model_are_baked_and_kept_where_they_stand() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = anisotropic_model(folder.path());
+    let webp = include_bytes!("../../kinran-image/tests/data/rgb.webp");
+    std::fs::write(folder.path().join("paint.webp"), webp).unwrap();
+    let mut document: Value = serde_json::from_slice(&std::fs::read(&model).unwrap()).unwrap();
+    let (images, textures) =
+        (document["images"].as_array().unwrap().len(), document["textures"].as_array().unwrap().len());
+    document["images"].as_array_mut().unwrap().push(json!({ "uri": "paint.webp", "mimeType": "image/webp" }));
+    document["textures"]
+        .as_array_mut()
+        .unwrap()
+        .push(json!({ "extensions": { "EXT_texture_webp": { "source": images } } }));
+    document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({ "index": textures });
+    document["extensionsUsed"].as_array_mut().unwrap().push(json!("EXT_texture_webp"));
+    document["extensionsRequired"] = json!(["EXT_texture_webp"]);
+    std::fs::write(&model, serde_json::to_vec(&document).unwrap()).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let bake = ["bake", text(&model), "-o", text(out.path()), "--all-textures", "--color-format", "rgba8"];
+    let report = kinran_json(&bake);
+    let written: Value =
+        serde_json::from_slice(&std::fs::read(out.path().join("square.gltf")).unwrap()).unwrap();
+    let info = &written["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"];
+    let texture = &written["textures"][info["index"].as_u64().unwrap() as usize];
+    assert!(texture.get("source").is_none(), "{texture}");
+    let uri = |extension: &str| {
+        let image = texture["extensions"][extension]["source"].as_u64().unwrap();
+        written["images"][image as usize]["uri"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(uri("EXT_texture_webp"), "paint.webp");
+    let baked = read_texture(&out.path().join(uri("KHR_texture_basisu"))).unwrap();
+    // Texel (3, 2) as it was painted: 3 * 12 + 2, 2 * 17, 255 - 3 * 12 - 2.
+    assert_eq!(baked.levels[0].data[(2 * 13 + 3) * 4..][..3], [38, 34, 217], "{}", report["warnings"]);
 }
 
 /// Every format that is asked for is what the files hold.

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use glam::{Vec2, Vec3, Vec4, vec2, vec3};
-use kinran_image::{Format, Pixels, Transfer, read_image, read_texture};
+use kinran_image::{Format, Pixels, Transfer, read_image, read_layer, read_texture};
 use kinran_scene::Scene;
 use kinran_shading::skin::curvature::curvature_decode;
 use serde_json::{Value, json};
@@ -637,11 +637,15 @@ fn primitives_of_one_surface_are_baked_together_and_dumped() {
     assert_eq!(dump["primitives"].as_array().unwrap().len(), 2);
     let principal = vertices[500]["principal"][0].as_f64().unwrap();
     assert!((principal - 0.1).abs() < 0.001, "{principal}");
-    let Pixels::F32(samples) = read_image(&out.join("halves_mesh_curvature.exr")).unwrap().pixels else {
-        panic!("no floats")
+    let layer = |name| match read_layer(&out.join("halves_mesh_curvature.exr"), name).unwrap().pixels {
+        Pixels::F32(samples) => samples,
+        _ => panic!("no floats"),
     };
-    assert!(samples.len() >= 4 * vertices.len());
-    assert!((f64::from(samples[4 * 500 + 3]) - 0.1).abs() < 0.001, "the mean stands in A: {}", samples[2003]);
+    let (tensor, mean) = (layer(Some("tensor")), layer(None));
+    assert!(tensor.len() >= 3 * vertices.len() && mean.len() >= vertices.len());
+    assert!((mean[500] - 0.1).abs() < 0.001, "the mean is {}", mean[500]);
+    let [xx, yy] = [tensor[3 * 500], tensor[3 * 500 + 2]];
+    assert!((0.5 * (xx + yy) - mean[500]).abs() < 1e-6, "half the trace of {xx}, {yy} is not {}", mean[500]);
 }
 
 #[test]

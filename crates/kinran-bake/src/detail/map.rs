@@ -79,7 +79,7 @@ pub(crate) fn for_each_row(planes: &mut Planes, write: impl Fn(usize, [&mut [f32
         .for_each(|(y, (((r0, r1), r2), r3))| write(y, [r0, r1, r2, r3]));
 }
 
-/// An image's texels as a sampler would see them uncompressed. Float colour is taken as linear light.
+/// An image's texels as a sampler would see them uncompressed. Colour is encoded as [`Image::transfer`] says.
 ///
 /// # Errors
 /// [`Error::Unsupported`] where a blended sample lies outside [0, 1] (colour and data) or a normal map is grey.
@@ -112,9 +112,10 @@ pub(crate) fn planes_of_image(image: &Image, kind: MapKind, y_down: bool) -> Res
         _ => Vec::new(),
     };
     let linear = |v: f32| match image.pixels {
+        _ if image.transfer == Transfer::Linear => v,
         Pixels::U8(_) => linear_from_byte((v * 255.0 + 0.5) as u8),
         Pixels::U16(_) => wide[(v * 65535.0 + 0.5) as usize],
-        Pixels::F32(_) => v,
+        Pixels::F32(_) => linear_from_srgb(v),
     };
 
     let mut planes = Planes::zeros(image.width, image.height);
@@ -255,7 +256,7 @@ pub(crate) fn decoded_level(texture: &Texture, level: usize, kind: MapKind) -> R
     let texels = texture.decode_level(level)?;
     let Level { width, height, .. } = texture.levels[level];
     let mut planes = Planes::zeros(width, height);
-    let srgb = texture.transfer == Transfer::Srgb && kind == MapKind::Color;
+    let srgb = kind == MapKind::Color && texture.transfer.of_content(true) == Transfer::Srgb;
     for_each_row(&mut planes, |y, out| {
         let [p0, p1, p2, p3] = out;
         for (x, texel) in texels[y * width as usize..][..width as usize].iter().enumerate() {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use kinran_image::{Channels, Image, Pixels, read_image};
+use kinran_image::{Channels, Image, Pixels, Transfer, read_layer};
 use kinran_scene::Wrap;
 use kinran_shading::{alpha_from_roughness, alphas_from_khr_anisotropy};
 use rayon::prelude::*;
@@ -26,6 +26,8 @@ pub struct LoadedMap {
     pub path: PathBuf,
     /// Its samples.
     pub image: Arc<Image>,
+    /// What was chosen when it was read, a part of a sentence each: the layer, how colour is encoded.
+    pub remarks: Vec<String>,
 }
 
 /// A material with its images in memory.
@@ -51,16 +53,6 @@ type AlphaLaw = fn(f32, f32) -> (f32, f32);
 /// Images already read, by path.
 pub(super) type Images = BTreeMap<PathBuf, Arc<Image>>;
 
-/// An image, read once.
-pub(super) fn read(images: &mut Images, path: &Path) -> Result<Arc<Image>, FolderError> {
-    if let Some(image) = images.get(path) {
-        return Ok(image.clone());
-    }
-    let image = Arc::new(read_image(path)?);
-    images.insert(path.into(), image.clone());
-    Ok(image)
-}
-
 impl MaterialMaps {
     /// Reads every map and checks that it holds what its name says. Maps may differ in size.
     ///
@@ -78,14 +70,13 @@ impl MaterialMaps {
         let paths: BTreeSet<&PathBuf> = self.files.iter().map(|(_, path)| path).collect();
         let images: Images = (paths.into_par_iter())
             .map(|path| {
-                let image = known.get(path).cloned().map_or_else(|| read_image(path).map(Arc::new), Ok)?;
+                let image = known.get(path).cloned().map_or_else(|| self.image(path).map(Arc::new), Ok)?;
                 Ok((path.clone(), image))
             })
             .collect::<Result<_, FolderError>>()?;
         drop(known);
-        let loaded: Vec<LoadedMap> = (self.files.iter())
-            .map(|(role, path)| LoadedMap { role: *role, path: path.clone(), image: images[path].clone() })
-            .collect();
+        let loaded: Vec<LoadedMap> =
+            (self.files.iter()).map(|(role, path)| self.loaded(*role, path, images[path].clone())).collect();
         let place = |map: &MapChannel| Some((loaded.iter().position(|l| l.path == map.file)?, map.channel));
         let (occlusion, metallic) =
             (self.occlusion.as_ref().and_then(place), self.metallic.as_ref().and_then(place));
@@ -105,6 +96,55 @@ impl MaterialMaps {
             }
         };
         Ok(LoadedMaterial { name: self.name.clone(), surface, images: loaded, occlusion, metallic, notes })
+    }
+}
+
+impl MaterialMaps {
+    /// Reads one of [`MaterialMaps::files`].
+    ///
+    /// # Errors
+    /// [`FolderError::Image`] where the file cannot be read.
+    pub fn read(&self, role: Role, path: &Path) -> Result<LoadedMap, FolderError> {
+        Ok(self.loaded(role, path, Arc::new(self.image(path)?)))
+    }
+
+    /// An image, read once.
+    pub(super) fn image_once(&self, images: &mut Images, path: &Path) -> Result<Arc<Image>, FolderError> {
+        if let Some(image) = images.get(path) {
+            return Ok(image.clone());
+        }
+        let image = Arc::new(self.image(path)?);
+        images.insert(path.into(), image.clone());
+        Ok(image)
+    }
+
+    /// An image: of an EXR file the layer that a flag names, colour encoded as a flag says.
+    fn image(&self, path: &Path) -> Result<Image, FolderError> {
+        let layer = self.layers.iter().rev().find(|(file, _)| file == path).map(|(_, layer)| layer.as_str());
+        let mut image = read_layer(path, layer)?;
+        if let Some(space) = self.color_space.filter(|_| self.color.as_deref() == Some(path)) {
+            image.transfer = space;
+        }
+        Ok(image)
+    }
+
+    fn loaded(&self, role: Role, path: &Path, image: Arc<Image>) -> LoadedMap {
+        let mut remarks = image.notes.clone();
+        let space = if image.transfer == Transfer::Linear { "linear" } else { "sRGB" };
+        match (role, image.transfer) {
+            (Role::Color, _) if self.color_space.is_some() => {
+                remarks.push(format!("{space}, by --color-space"))
+            }
+            (Role::Color, Transfer::Linear) => {
+                remarks.push("taken as linear; say --color-space srgb if it is not".into());
+            }
+            (Role::Color, Transfer::Srgb) => remarks.push("sRGB, as its file says".into()),
+            (_, Transfer::Srgb) => {
+                remarks.push("sRGB by its file, which no data are; taken as stored".into())
+            }
+            _ => {}
+        }
+        LoadedMap { role, path: path.into(), image, remarks }
     }
 }
 
@@ -187,14 +227,14 @@ fn channel(images: &Images, map: &MapChannel) -> Result<ScalarMap, FolderError> 
     // Grey with alpha keeps its alpha in the second channel.
     let channel = if map.channel == 3 && count == 2 { 1 } else { map.channel };
     if count == 2 && channel == 1 {
-        let alpha = second_channel(image);
+        let alpha = second_channel(image)?;
         return Ok(ScalarMap::channel(Arc::new(alpha), 0));
     }
     Ok(ScalarMap::channel(image.clone(), channel))
 }
 
 /// The alpha of a grey image, as a grey image.
-fn second_channel(image: &Image) -> Image {
+fn second_channel(image: &Image) -> Result<Image, FolderError> {
     fn odd<T: Copy>(v: &[T]) -> Vec<T> {
         v.iter().skip(1).step_by(2).copied().collect()
     }
@@ -203,7 +243,7 @@ fn second_channel(image: &Image) -> Image {
         Pixels::U16(v) => Pixels::U16(odd(v)),
         Pixels::F32(v) => Pixels::F32(odd(v)),
     };
-    Image { width: image.width, height: image.height, channels: Channels::R, pixels }
+    Ok(Image::new(image.width, image.height, Channels::R, pixels)?)
 }
 
 fn grey_file(images: &Images, file: &Path) -> ScalarMap {

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use kinran_image::IMAGE_EXTENSIONS;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -213,7 +214,7 @@ fn digits(word: &str) -> bool {
 fn is_noise(word: &str) -> bool {
     let number = |s: &str| digits(s) && s.len() <= 5;
     let side = |s: &str| number(s) && s.parse::<u32>().is_ok_and(|n| n >= 128 && n.is_power_of_two());
-    matches!(word, "png" | "jpg" | "jpeg" | "tga" | "tif" | "tiff" | "exr" | "hdr")
+    IMAGE_EXTENSIONS.contains(&word)
         || matches!(
             word,
             "map" | "tex" | "texture" | "srgb" | "linear" | "raw" | "8bit" | "16bit" | "8b" | "16b"

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use kinran_image::Image;
 
 use super::evidence::{apart, green_correlation, guess_by_correlation};
-use super::load::{Images, read};
+use super::load::Images;
 use super::{FolderError, Green, GreenGuess, GreenSource, MaterialMaps, Role, file_name};
 
 /// A file that should say what another one says, which is used in its place.
@@ -42,7 +42,8 @@ impl MaterialMaps {
     ) -> Result<MaterialMaps, FolderError> {
         let mut maps = self.clone();
         for twin in &self.twins {
-            let [used, other] = [read(images, &twin.used)?, read(images, &twin.other)?];
+            let [used, other] = [&twin.used, &twin.other].map(|file| self.image_once(images, file));
+            let (used, other) = (used?, other?);
             if twin.role == Role::Normal {
                 self.settle_normals(twin, [&used, &other], &mut maps, notes)?;
                 continue;

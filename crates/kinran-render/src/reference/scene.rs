@@ -3,7 +3,7 @@
 use super::{FuzzFits, Geometry, MipTexture, RenderDetail, RenderDetailLayer, RenderFuzz, RenderSkin};
 use crate::Error;
 use glam::{Mat3, Vec2, Vec3, Vec4};
-use kinran_image::{Channels, Image, Pixels, Transfer};
+use kinran_image::{Channels, Image, Pixels, Texture, Transfer};
 use kinran_scene::{
     AlphaMode, Detail, DetailMap, Environment, Fuzz, FuzzDirection, FuzzLayer, FuzzPhase, Light, Material,
     Scene, TextureRef,
@@ -11,7 +11,7 @@ use kinran_scene::{
 use kinran_shading::fuzz::fibre_direction;
 use kinran_shading::sh::{Sh9, sh_convolve_cosine, sh_evaluate};
 use kinran_shading::skin::lighting::skin_irradiance;
-use std::{collections::HashMap, sync::Arc};
+use std::{borrow::Cow, collections::HashMap, sync::Arc};
 
 /// A texture in its place on a mesh.
 #[derive(Clone, Debug)]
@@ -217,6 +217,15 @@ impl BoundTexture {
     }
 }
 
+/// A runtime texture, with the transfer of its slot where its file says none.
+fn said(texture: &Texture, slot: Transfer) -> Cow<'_, Texture> {
+    if texture.transfer != Transfer::Unsaid {
+        return Cow::Borrowed(texture);
+    }
+    let transfer = texture.transfer.of_content(slot == Transfer::Srgb);
+    Cow::Owned(Texture { transfer, ..texture.clone() })
+}
+
 /// Makes each image's mips once, however many materials use it.
 struct TextureLoader<'a> {
     scene: &'a Scene,
@@ -232,7 +241,7 @@ impl TextureLoader<'_> {
             })?;
             let runtime = place.runtime.and_then(|i| self.scene.textures.get(i)?.as_ref());
             let texture = match runtime {
-                Some(texture) => MipTexture::from_texture(texture, place.wrap)
+                Some(texture) => MipTexture::from_texture(&said(texture, transfer), place.wrap)
                     .map_err(|e| Error::Scene(format!("the texture of image {}: {e}", place.image)))?,
                 None => MipTexture::from_image(image, transfer, place.wrap),
             };

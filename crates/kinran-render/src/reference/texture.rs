@@ -5,7 +5,7 @@
 //! corner of the first texel.
 
 use glam::{Vec2, Vec4, vec2};
-use kinran_image::{Image, Pixels, Texture, Transfer};
+use kinran_image::{Image, Texture, Transfer};
 use kinran_scene::Wrap;
 use std::sync::{Arc, LazyLock};
 
@@ -39,7 +39,7 @@ impl MipTexture {
     }
 
     /// An authored image with box-filtered mips: every level is the area average of the one above. sRGB
-    /// colour is decoded before it is averaged; alpha and float images are linear already. One channel is
+    /// colour is decoded before it is averaged; alpha and images of linear colour are linear already. One channel is
     /// grey, two are grey and alpha; a missing alpha is 1.
     pub fn from_image(image: &Image, transfer: Transfer, wrap: [Wrap; 2]) -> Self {
         let mut texels = Vec::with_capacity(image.width as usize * image.height as usize);
@@ -48,7 +48,7 @@ impl MipTexture {
             image.row_rgba_f32(y, &mut row);
             texels.extend_from_slice(&row);
         }
-        if transfer == Transfer::Srgb && !matches!(image.pixels, Pixels::F32(_)) {
+        if transfer == Transfer::Srgb && image.transfer != Transfer::Linear {
             linearize(&mut texels);
         }
 
@@ -224,7 +224,7 @@ fn area_weights(from: u32, to: u32) -> Vec<Vec<(usize, f32)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kinran_image::Channels;
+    use kinran_image::{Channels, Pixels};
 
     fn ramp(wrap: Wrap) -> MipTexture {
         let texels = (0..4).map(|x| [x as f32, 0.0, 0.0, 1.0]).collect();
@@ -270,8 +270,7 @@ mod tests {
 
     #[test]
     fn srgb_is_averaged_in_linear_light_and_alpha_is_not_decoded() {
-        let image =
-            Image { width: 2, height: 1, channels: Channels::Rg, pixels: Pixels::U8(vec![0, 0, 255, 128]) };
+        let image = Image::new(2, 1, Channels::Rg, Pixels::U8(vec![0, 0, 255, 128])).unwrap();
         let texture = MipTexture::from_image(&image, Transfer::Srgb, [Wrap::Repeat; 2]);
         assert_eq!(texture.levels.len(), 2);
         let [r, _, _, a] = texture.levels[1].texels[0];
@@ -279,7 +278,7 @@ mod tests {
         assert!((a - 64.0 / 255.0).abs() < 1e-6, "alpha {a}");
 
         // Code 188 is the encoding of half the light, rounded: ((188 / 255 + 0.055) / 1.055)^2.4.
-        let image = Image { width: 1, height: 1, channels: Channels::R, pixels: Pixels::U8(vec![188]) };
+        let image = Image::new(1, 1, Channels::R, Pixels::U8(vec![188])).unwrap();
         let got = MipTexture::from_image(&image, Transfer::Srgb, [Wrap::Repeat; 2]).levels[0].texels[0][0];
         assert!((got - 0.502_886_5).abs() < 1e-6, "code 188 is {got}");
     }
@@ -287,7 +286,7 @@ mod tests {
     #[test]
     fn odd_sizes_keep_the_mean_on_every_level() {
         let samples: Vec<f32> = (0..13 * 7).map(|i| ((i * 37) % 101) as f32 / 100.0).collect();
-        let image = Image { width: 13, height: 7, channels: Channels::R, pixels: Pixels::F32(samples) };
+        let image = Image::new(13, 7, Channels::R, Pixels::F32(samples)).unwrap();
         let texture = MipTexture::from_image(&image, Transfer::Linear, [Wrap::Repeat; 2]);
         let sizes: Vec<_> = texture.levels.iter().map(|l| (l.width, l.height)).collect();
         assert_eq!(sizes, [(13, 7), (6, 3), (3, 1), (1, 1)]);

@@ -6,8 +6,9 @@ use kinran_bake::curvature::{
     BLUR, Curvature, Mesh, Method, Options, Packed, bake_curvature, estimated_normals, principal,
     uniform_scale,
 };
-use kinran_image::{Channels, Image, Pixels, write_atomically, write_exr};
+use kinran_image::{write_atomically, write_exr_planes};
 use kinran_scene::{Attribute, Document, Instance, Maps, Needs, Pose, Primitive, Scene, Skin};
+use kinran_shading::Sym2;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -83,7 +84,8 @@ pub enum MethodName {
 pub enum DumpFormat {
     /// NAME_curvature.json: tensor, mean, principal curvatures and direction of every vertex
     Json,
-    /// NAME_curvature.exr: a pixel for each vertex, row by row: xx, xy, yy in RGB, mean in A
+    /// NAME_curvature.exr: a pixel for each vertex, row by row: the mean in Y; xx, xy, yy in X, Y, Z of
+    /// the layer tensor
     Exr,
 }
 
@@ -598,12 +600,19 @@ fn dump(
     match format {
         DumpFormat::Exr => {
             let height = baked.tensors.len().div_ceil(DUMP_WIDTH);
-            let mut samples: Vec<f32> =
-                baked.tensors.iter().flat_map(|t| [t.xx, t.xy, t.yy, 0.5 * t.trace()]).collect();
-            samples.resize(DUMP_WIDTH * height * 4, 0.0);
-            let pixels = Pixels::F32(samples);
-            let image = Image::new(DUMP_WIDTH as u32, height as u32, Channels::Rgba, pixels)?;
-            write_exr(&path, &image)?;
+            let plane = |value: fn(&Sym2) -> f32| {
+                let mut plane: Vec<f32> = baked.tensors.iter().map(value).collect();
+                plane.resize(DUMP_WIDTH * height, 0.0);
+                plane
+            };
+            // Not as R, G, B and A: readers divide colours by alpha.
+            let planes = vec![
+                ("tensor.X", plane(|t| t.xx)),
+                ("tensor.Y", plane(|t| t.xy)),
+                ("tensor.Z", plane(|t| t.yy)),
+                ("Y", plane(|t| 0.5 * t.trace())),
+            ];
+            write_exr_planes(&path, (DUMP_WIDTH as u32, height as u32), planes)?;
         }
         DumpFormat::Json => {
             let vertices: Vec<Value> = (baked.tensors.iter().enumerate())

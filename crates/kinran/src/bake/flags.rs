@@ -35,7 +35,7 @@ const fn flag(name: &'static str, on: On, given: fn(&Args) -> bool) -> Flag {
 }
 
 /// Every flag, in the order of `kinran bake --help`.
-pub(super) const FLAGS: [Flag; 39] = [
+pub(super) const FLAGS: [Flag; 41] = [
     flag("output", On::Run, |a| a.output.is_some()),
     flag("filter", On::Any, |a| a.filter.name() != "ml"),
     flag("kernel", On::Any, |a| a.kernel != KernelName::default()),
@@ -61,6 +61,8 @@ pub(super) const FLAGS: [Flag; 39] = [
     flag("dry-run", On::Run, |a| a.dry_run),
     flag("force", On::One, |a| a.force),
     flag("normal-blue", On::Folder, |a| a.normal_blue),
+    flag("color-space", On::Folder, |a| a.color_space.is_some()),
+    flag("exr-layer", On::Folder, |a| !a.exr_layer.is_empty()),
     flag("allow-outside", On::Model, |a| !a.model.allow_outside.is_empty()),
     flag("skin", On::Model, |a| !a.curvature.skin.is_empty()),
     flag("curvature", On::Model, |a| a.curvature.curvature != Which::default()),

@@ -1,7 +1,7 @@
 //! A folder of authored maps.
 
 use kinran_bake::aniso::{Sheet, SheetRequest, bake_surface};
-use kinran_bake::folder::{ASSUMED_ROUGHNESS, LoadedMaterial, MaterialMaps, Role as MapRole, scan};
+use kinran_bake::folder::{ASSUMED_ROUGHNESS, LoadedMaterial, MaterialMaps, Role as MapRole, Row, scan};
 use kinran_bake::{bake_plain, pack_channels};
 use kinran_image::{Image, Role, Transfer, full_level_count, image_size, level_size};
 use rayon::prelude::*;
@@ -12,21 +12,47 @@ use super::{
     texture_files, texture_space, write_texture,
 };
 use crate::content::Content;
-use crate::outputs::{Space, check_space, refuse_foreign};
+use crate::outputs::{Space, check_space, has_extension, refuse_foreign};
 use crate::{Console, Error};
 
 /// Bakes a folder and tells what came of it.
 pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    let folder = scan(&args.input, &args.hints())?;
+    let mut folder = scan(&args.input, &args.hints())?;
     let reports = bake_folder(args, console)?;
+    for surface in reports.iter().flat_map(|report| &report.surfaces) {
+        for input in &surface.inputs {
+            add_remarks(&mut folder.rows, &surface.name, &input.file, &input.notes);
+        }
+    }
     let files: String = reports.iter().map(|report| report.text(args.output())).collect();
     let text = format!("{}\n{files}", folder.table());
     console.result(&BakeReport::new(args, folder.rows, reports), &text)
 }
 
+/// Adds what was chosen when a file was read to its row.
+fn add_remarks(rows: &mut [Row], material: &str, file: &str, remarks: &[String]) {
+    let is_it = |row: &&mut Row| row.material == material && row.file.rsplit('/').next() == Some(file);
+    if let Some(row) = rows.iter_mut().find(is_it) {
+        let notes = std::iter::once(row.note.as_str()).chain(remarks.iter().map(String::as_str));
+        row.note = notes.filter(|note| !note.is_empty()).collect::<Vec<_>>().join("; ");
+    }
+}
+
+/// Extensions of files that leave something to choose when they are read, or say something of their own.
+const TALKATIVE: [&str; 6] = ["exr", "hdr", "tif", "tiff", "ktx2", "dds"];
+
 /// Tells what was understood of a folder.
 pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
-    let folder = scan(&args.input, &args.hints())?;
+    let mut folder = scan(&args.input, &args.hints())?;
+    for material in &folder.materials {
+        for (role, path) in &material.files {
+            let said = *role == MapRole::Color && args.color_space.is_some();
+            if said || TALKATIVE.iter().any(|extension| has_extension(path, extension)) {
+                let read = material.read(*role, path)?;
+                add_remarks(&mut folder.rows, &material.name, &file_name(path), &read.remarks);
+            }
+        }
+    }
     let mut report = Report::new(args);
     let names = folder.materials.iter().map(|material| material.name.clone());
     report.surfaces = names.map(SurfaceReport::new).collect();
@@ -219,6 +245,7 @@ fn inputs(material: &LoadedMaterial) -> Result<Vec<Input>, Error> {
                 width: map.image.width,
                 height: map.image.height,
                 blake3: hash_file(&map.path)?,
+                notes: map.remarks.clone(),
             })
         })
         .collect()

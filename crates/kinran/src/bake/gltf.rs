@@ -129,7 +129,7 @@ impl Colored {
     fn content(&self) -> Content {
         match self.transfer {
             Transfer::Srgb => Content::Color,
-            Transfer::Linear => Content::Data,
+            Transfer::Linear | Transfer::Unsaid => Content::Data,
         }
     }
 
@@ -629,6 +629,7 @@ fn input(document: &Document, index: usize, role: &str, image: &Image) -> Result
         width: image.width,
         height: image.height,
         blake3: blake3::hash(&document.image_bytes(index)?).to_hex().to_string(),
+        notes: image.notes.clone(),
     })
 }
 

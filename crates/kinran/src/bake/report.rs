@@ -25,6 +25,9 @@ pub struct Input {
     pub height: u32,
     /// BLAKE3 of the file's bytes.
     pub blake3: String,
+    /// What was chosen when it was read: the layer, how colour is encoded.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 /// A file that came out.

@@ -49,7 +49,10 @@ impl Flags {
     pub(super) fn with_files(&self, file: &mut dyn FnMut(&Path) -> PathBuf) -> Flags {
         let mut flags = self.clone();
         match &mut flags {
-            Flags::Bake(args) => args.map.iter_mut().for_each(|(_, path)| *path = file(path)),
+            Flags::Bake(args) => {
+                args.map.iter_mut().for_each(|(_, path)| *path = file(path));
+                args.exr_layer.iter_mut().for_each(|(path, _)| *path = file(path));
+            }
             Flags::Detail(args) => {
                 for layer in &mut args.layer {
                     layer.tile = file(&layer.tile);
@@ -132,7 +135,9 @@ pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestErr
     let mut args = BakeFlags::try_parse_from(all).map_err(wrong)?.args;
     super::check_formats(&args).map_err(|e| manifest.error(&job.place, e.to_string()))?;
     args.model.allow_outside.iter_mut().for_each(|folder| *folder = manifest.beside(&*folder));
-    for path in args.map.iter_mut().map(|(_, path)| path).chain(&mut args.ignore) {
+    let maps = args.map.iter_mut().map(|(_, path)| path);
+    let layers = args.exr_layer.iter_mut().map(|(path, _)| path);
+    for path in maps.chain(&mut args.ignore).chain(layers) {
         if !job.input.join(&path).exists() {
             *path = manifest.beside(&*path);
         }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use glam::{Vec3, Vec4};
-use kinran_image::{Channels, Image, Pixels, read_image};
+use kinran_image::{Channels, Image, Pixels, read_layer};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -23,6 +23,10 @@ pub(crate) struct Report {
     height: u32,
     bits: u32,
     float: bool,
+    /// How red, green and blue are encoded if they are colour: `linear`, `srgb`, or `unsaid`, which is sRGB for colour.
+    transfer: String,
+    /// What was chosen or left out when it was read.
+    notes: Vec<String>,
     channels: Vec<ChannelReport>,
     /// Of images that look like a normal map.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -44,8 +48,8 @@ struct NormalReport {
     below_share: f32,
 }
 
-pub(super) fn inspect(path: &Path, console: &Console) -> Result<(), Error> {
-    let image = read_image(path)?;
+pub(super) fn inspect(path: &Path, layer: Option<&str>, console: &Console) -> Result<(), Error> {
+    let image = read_layer(path, layer)?;
     let (bits, float) = match image.pixels {
         Pixels::U8(_) => (8, false),
         Pixels::U16(_) => (16, false),
@@ -68,6 +72,8 @@ pub(super) fn inspect(path: &Path, console: &Console) -> Result<(), Error> {
         height: image.height,
         bits,
         float,
+        transfer: format!("{:?}", image.transfer).to_lowercase(),
+        notes: image.notes.clone(),
         channels: names.iter().filter_map(channel).collect(),
         normal_map: normal_report(&image),
     };
@@ -109,6 +115,13 @@ fn text(report: &Report) -> String {
         row("size", format!("{}x{}", report.width, report.height)),
         row("samples", format!("{} channels of {}-bit {kind}", report.channels.len(), report.bits)),
     ];
+    let color = match report.transfer.as_str() {
+        "unsaid" => "sRGB, if it is colour",
+        "srgb" => "sRGB, as the file says",
+        _ => "linear",
+    };
+    facts.push(row("colour", color.into()));
+    facts.extend(report.notes.iter().map(|note| row("note", note.clone())));
     if let Some(normals) = &report.normal_map {
         let percent = |share: f32| format!("{:.2} %", share * 100.0);
         facts.push(row(

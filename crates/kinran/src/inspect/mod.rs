@@ -8,6 +8,7 @@ mod texture;
 
 use std::path::PathBuf;
 
+use kinran_image::{IMAGE_EXTENSIONS, has_image_extension};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -20,7 +21,7 @@ use crate::{Console, Error, outputs};
 ///
 /// .ktx2 and .dds: format, transfer function, size, key/values, and statistics of every level that suit
 /// what the map holds. .glb, .gltf and .obj: geometry, materials, what `kinran bake` would do with them,
-/// extensions, warnings. .png, .jpg, .tga, .tif, .hdr and .exr: size, channels, ranges, and whether what
+/// extensions, warnings. .png, .jpg, .tga, .bmp, .webp, .tif, .hdr and .exr: size, channels, ranges, and whether what
 /// looks like a normal map is one. .json: what a report of `kinran` says, and whether the files that it names are as
 /// they were written.
 #[derive(Debug, clap::Args)]
@@ -39,6 +40,10 @@ pub struct Args {
     #[arg(long, value_enum, value_name = "MAP")]
     pub role: Option<Content>,
 
+    /// Of an EXR file, the layer to look at
+    #[arg(long, value_name = "LAYER")]
+    pub exr_layer: Option<String>,
+
     #[command(flatten)]
     #[allow(missing_docs)]
     pub model: ModelArgs,
@@ -53,9 +58,6 @@ pub(crate) enum Report {
     Image(image::Report),
     Written(report::Report),
 }
-
-/// Extensions of image files that are read.
-const IMAGES: [&str; 8] = ["png", "jpg", "jpeg", "tga", "tif", "tiff", "hdr", "exr"];
 
 /// The command.
 ///
@@ -74,17 +76,21 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             role.name()
         )));
     }
+    if let Some(layer) = args.exr_layer.as_ref().filter(|_| !is(&["exr"])) {
+        let reason = format!("--exr-layer {layer}: only EXR files have layers; leave the flag out");
+        return Err(Error::Usage(format!("{}: {reason}", args.file.display())));
+    }
     if kinran_scene::is_gltf(&args.file) || is(&["obj"]) {
         model::inspect(&args.file, args.model.allowed()?, console)
-    } else if is(&IMAGES) {
-        image::inspect(&args.file, console)
+    } else if has_image_extension(&args.file) {
+        image::inspect(&args.file, args.exr_layer.as_deref(), console)
     } else if is(&["json"]) {
         report::inspect(&args.file, console)
     } else {
         Err(Error::Usage(format!(
-            "{}: this kind of file is not known; give a .ktx2, .dds, .glb, .gltf, .obj, a report of kinran (.json) or an image (.{})",
+            "{}: this kind of file is not known; give a .glb, .gltf, .obj, a report of kinran (.json), a texture or an image (.{})",
             args.file.display(),
-            IMAGES.join(", .")
+            IMAGE_EXTENSIONS.join(", .")
         )))
     }
 }

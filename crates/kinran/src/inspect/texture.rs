@@ -92,7 +92,13 @@ fn text(report: &Report) -> String {
     let row = |name: &str, value: String| vec![name.to_owned(), value];
     let mut facts = vec![
         row("file", format!("{}, {}", report.file, bytes_text(report.file_bytes))),
-        row("format", format!("{}, {}", report.format, report.transfer)),
+        row(
+            "format",
+            match report.transfer.as_str() {
+                "unsaid" => format!("{}; whether it is sRGB is not said", report.format),
+                said => format!("{}, {said}", report.format),
+            },
+        ),
         row(
             "size",
             format!(

@@ -215,13 +215,14 @@ impl Work {
                 let view = View::new(&scene, &path.to_string_lossy(), &args)?;
                 let plain = vec![None; scene.materials.len()];
                 let prepared = view.scene(&scene, plain)?;
+                let warnings = scene.warnings.iter().chain(view.environment_notes()).cloned().collect();
                 let opened = Opened {
                     name: path.to_string_lossy().into_owned(),
                     mips: Mips::of(&scene),
                     view,
                     material_names: scene.materials.iter().map(|m| m.name.clone()).collect(),
                     scene: prepared.clone(),
-                    warnings: scene.warnings.clone(),
+                    warnings,
                     at: Instant::now(),
                 };
                 self.model = Some((Arc::new(scene), prepared));
