@@ -252,7 +252,8 @@ fn unassociate(image: Image) -> Image {
         let texel = |texel: &[u16]| {
             let alpha = u64::from(texel[channels - 1]);
             let color = |c: u16| {
-                if alpha == 0 { c } else { ((u64::from(c) * 65535 + alpha / 2) / alpha).min(65535) as u16 }
+                let quotient = (u64::from(c) * 65535 + alpha / 2).checked_div(alpha);
+                quotient.map_or(c, |quotient| quotient.min(65535) as u16)
             };
             let mut out = [0; 4];
             for (o, c) in out.iter_mut().zip(&texel[..channels - 1]) {

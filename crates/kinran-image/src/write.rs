@@ -189,7 +189,7 @@ pub fn write_exr(path: &Path, image: &Image) -> Result<(), Error> {
     let n = names.len();
     let plane = |c: usize| {
         let associated =
-            |texel: &[f32]| if n % 2 == 0 && c < n - 1 { texel[c] * texel[n - 1] } else { texel[c] };
+            |texel: &[f32]| if n.is_multiple_of(2) && c < n - 1 { texel[c] * texel[n - 1] } else { texel[c] };
         samples.chunks_exact(n).map(associated).collect()
     };
     let planes = names.iter().enumerate().map(|(c, &name)| (name, plane(c))).collect();

@@ -222,7 +222,7 @@ fn choice(layers: &[Layer], taken: &Layer) -> Option<String> {
 
 /// Sets what a part says of its colour. `colorInteropID` is the ASWF Color Interop Forum's, written by Blender since 5.0.
 fn color_of(header: &Header, image: &mut Image) {
-    let id = header.own_attributes.other.iter().find(|(name, _)| name.to_string() == "colorInteropID");
+    let id = header.own_attributes.other.iter().find(|(name, _)| **name == *"colorInteropID");
     let id = match id {
         Some((_, AttributeValue::Text(text))) => text.to_string(),
         _ => String::new(),
