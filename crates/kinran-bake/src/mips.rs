@@ -403,7 +403,11 @@ pub fn pack_channels(
     Image::new(size.0, size.1, Channels::Rgba, Pixels::U8(bytes))
 }
 
-/// The mip chain of an image that needs no filter of its own, compressed. `transfer` as for [`plain_levels`].
+/// Rows that are compressed at a time.
+const STRIP_ROWS: usize = 256;
+
+/// The mip chain of an image that needs no filter of its own, compressed. `transfer` as for [`plain_levels`]; `progress` is
+/// told of texels that are done.
 ///
 /// # Errors
 /// [`Error::Unsupported`] where the encoder refuses.
@@ -413,11 +417,18 @@ pub fn bake_plain(
     encoding: Encoding,
     kernel: Kernel,
     wrap: [Wrap; 2],
+    progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Texture, Error> {
     let levels = plain_levels(image, (image.width, image.height), transfer, kernel, wrap)
         .into_iter()
         .map(|level| {
-            let data = encode_parallel(encoding, &level.rgba8, level.width, level.height)?;
+            let mut data = Vec::with_capacity(encoding.format.level_bytes(level.width, level.height));
+            let row = 4 * level.width as usize;
+            for strip in level.rgba8.chunks(STRIP_ROWS * row) {
+                let rows = (strip.len() / row) as u32;
+                data.extend(encode_parallel(encoding, strip, level.width, rows)?);
+                progress(u64::from(level.width) * u64::from(rows));
+            }
             Ok(Level { width: level.width, height: level.height, data })
         })
         .collect::<Result<_, Error>>()?;

@@ -66,10 +66,19 @@ pub struct Table {
 }
 
 /// What part of a punctual light's irradiance at normal incidence leaves skin: columns are n·u from -1 to 1, rows
-/// are curvature from 0 to `range` (1/mm), both at the middles of texels. Clamped, linear sampling reads it right.
-pub fn punctual_table(profile: RadialProfile<'_>, width: usize, height: usize, range: f64) -> Table {
+/// are curvature from 0 to `range` (1/mm), both at the middles of texels. Clamped, linear sampling reads it right. `progress` is
+/// told of texels that are done.
+pub fn punctual_table(
+    profile: RadialProfile<'_>,
+    width: usize,
+    height: usize,
+    range: f64,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Table {
     if let Some(lengths) = profile.burley_lengths() {
-        return burley_table(lengths, width, height, range);
+        let table = burley_table(lengths, width, height, range);
+        progress((width * height) as u64);
+        return table;
     }
     let mut samples = Vec::new();
     let linear = sampled(profile, &mut samples);
@@ -80,6 +89,7 @@ pub fn punctual_table(profile: RadialProfile<'_>, width: usize, height: usize, r
         for (entry, exact) in entries.iter_mut().zip(exact) {
             *entry = exact.map(|x| x as f32);
         }
+        progress(width as u64);
     });
     Table { width, height, entries }
 }
@@ -241,11 +251,20 @@ impl Table {
     }
 }
 
-/// The largest error of reading a punctual table between its texels, on a grid four times as fine.
-pub fn punctual_interpolation_error(profile: RadialProfile<'_>, table: &Table, range: f64) -> f32 {
+/// Points along each side of a texel at which [`punctual_interpolation_error`] looks.
+pub const INTERPOLATION_GRID: usize = 4;
+
+/// The largest error of reading a punctual table between its texels, on a grid [`INTERPOLATION_GRID`] times as fine. `progress`
+/// is told of points of the grid that are done.
+pub fn punctual_interpolation_error(
+    profile: RadialProfile<'_>,
+    table: &Table,
+    range: f64,
+    progress: &(dyn Fn(u64) + Sync),
+) -> f32 {
     let mut samples = Vec::new();
     let linear = sampled(profile, &mut samples);
-    let (columns, rows) = (4 * table.width, 4 * table.height);
+    let (columns, rows) = (INTERPOLATION_GRID * table.width, INTERPOLATION_GRID * table.height);
     (0..rows)
         .into_par_iter()
         .map(|row| {
@@ -258,6 +277,7 @@ pub fn punctual_interpolation_error(profile: RadialProfile<'_>, table: &Table, r
                 let read = table.sample(u as f32, v as f32);
                 (0..3).for_each(|c| worst = worst.max((exact[c] as f32 - read[c]).abs()));
             }
+            progress(columns as u64);
             worst
         })
         .reduce(|| 0.0, f32::max)
@@ -273,7 +293,7 @@ mod tests {
         for (lengths, range) in [([0.9, 0.4, 0.2], 0.5), ([3.0, 0.05, 0.7], 2.0)] {
             let radial = RadialProfile::burley(lengths).unwrap();
             let (width, height) = (64, 40);
-            let table = punctual_table(radial, width, height, range);
+            let table = punctual_table(radial, width, height, range, &|_| {});
             let mut worst = (0.0f64, 0);
             for row in 0..height {
                 let mut exact = vec![[0.0; 3]; width];

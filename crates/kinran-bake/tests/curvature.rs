@@ -19,7 +19,7 @@ fn bake(shape: &Shape, with_normals: bool, options: &Options) -> Curvature {
         tangents: None,
         triangles: &shape.triangles,
     };
-    bake_curvature(&mesh, options).expect("a sound mesh")
+    bake_curvature(&mesh, options, &|_| {}).expect("a sound mesh")
 }
 
 /// The larger of both principal curvatures' errors at every inner vertex, sorted.
@@ -187,7 +187,7 @@ fn tensors_stand_in_the_mesh_s_own_tangent_frame() {
             tangents: Some(&tangents),
             triangles: &shape.triangles,
         };
-        let baked = bake_curvature(&mesh, &raw(method)).unwrap();
+        let baked = bake_curvature(&mesh, &raw(method), &|_| {}).unwrap();
         for (i, tensor) in baked.tensors.iter().enumerate() {
             let n = shape.normals[i];
             let t = tangents[i].truncate();
@@ -392,7 +392,8 @@ fn bad_meshes_are_refused_with_a_reason() {
     let shape = sphere(4, 1.0, 0.0);
     let refused =
         |positions: &[Vec3], normals: Option<&[Vec3]>, triangles: &[[u32; 3]], options: &Options| {
-            bake_curvature(&Mesh { positions, normals, tangents: None, triangles }, options).unwrap_err()
+            bake_curvature(&Mesh { positions, normals, tangents: None, triangles }, options, &|_| {})
+                .unwrap_err()
         };
     let options = Options::default();
     assert_eq!(refused(&shape.positions, None, &[], &options), CurvatureError::NoTriangles);

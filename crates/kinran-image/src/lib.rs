@@ -23,7 +23,7 @@ pub use error::Error;
 pub use image::{Channels, Image, MAX_IMAGE_BYTES, MAX_SIDE, Pixels};
 pub use ktx2_file::{decode_ktx2, encode_ktx2};
 pub use read::{IMAGE_EXTENSIONS, decode_image, has_image_extension, read_image, read_layer};
-pub use size::image_size;
+pub use size::{image_size, image_size_of};
 pub use texture::{Format, Level, Texture, Transfer, full_level_count, level_size};
 pub use texture_file::{decode_texture, read_texture, write_texture};
 pub use unfinished::{Unfinished, remove_unfinished};

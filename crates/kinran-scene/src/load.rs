@@ -88,6 +88,10 @@ const TEXELS_MAX: u64 = 1 << 30;
 /// Instances that one scene may have; at 80 bytes each, 1.3 GB.
 const INSTANCES_MAX: usize = 1 << 24;
 
+/// Triangles that take as long to read, with tangents made for them, as an image: one of 2048 by 2048. Chosen by eye, for
+/// bars.
+const IMAGE: u64 = 100_000;
+
 /// The maps of materials that a task asks for, each group with those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Maps {
@@ -149,12 +153,26 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`], about what is needed.
     pub fn load_part(path: impl AsRef<Path>, allowed: &[PathBuf], needs: &Needs) -> Result<Scene, Error> {
+        Scene::load_watched(path, allowed, needs, &|_, _| {})
+    }
+
+    /// As [`Scene::load_part`]; `watch` is told of how many units of work more there are than it has heard of, and how many
+    /// more are done. A unit is about what a triangle takes.
+    ///
+    /// # Errors
+    /// As [`Scene::load_part`].
+    pub fn load_watched(
+        path: impl AsRef<Path>,
+        allowed: &[PathBuf],
+        needs: &Needs,
+        watch: &(dyn Fn(u64, u64) + Sync),
+    ) -> Result<Scene, Error> {
         let path = path.as_ref();
         let mut bytes = read_regular_file(path).map_err(|error| Error::io(path, error))?;
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
             bytes = glb_from_obj(path, &bytes)?;
         }
-        Scene::read(path, &bytes, &beside(path, allowed), needs)
+        Scene::read(path, &bytes, &beside(path, allowed), needs, watch)
     }
 
     /// Reads a document from memory. `name` stands for it in messages; `resolve` gives the bytes of a
@@ -163,10 +181,16 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn from_bytes(name: &Path, bytes: &[u8], resolve: &GivenResolver<'_>) -> Result<Scene, Error> {
-        Scene::read(name, bytes, &given(resolve), &Needs::ALL)
+        Scene::read(name, bytes, &given(resolve), &Needs::ALL, &|_, _| {})
     }
 
-    fn read(name: &Path, bytes: &[u8], resolve: &Resolver<'_>, needs: &Needs) -> Result<Scene, Error> {
+    fn read(
+        name: &Path,
+        bytes: &[u8],
+        resolve: &Resolver<'_>,
+        needs: &Needs,
+        watch: &(dyn Fn(u64, u64) + Sync),
+    ) -> Result<Scene, Error> {
         let container = split(name, bytes)?;
         let no_gltf = |error: serde_json::Error| {
             Error::malformed(name, format!("the JSON does not describe glTF: {error}"))
@@ -191,10 +215,12 @@ impl Scene {
             first_use: Vec::new(),
             worlds: Vec::new(),
             needs: *needs,
+            watch,
             scene: Scene { warnings: container.warnings, ..Scene::default() },
         };
         loader.first_use = loader.first_uses();
         loader.materials()?;
+        watch(loader.extent(), 0);
         if needs.geometry {
             let meshes = loader.meshes()?;
             loader.nodes(&meshes)?;
@@ -270,6 +296,8 @@ struct Loader<'a> {
     /// Of all nodes, once a skin has asked for them.
     worlds: Vec<Option<DAffine3>>,
     needs: Needs,
+    /// Told of units of work that are known of, and of those that are done.
+    watch: &'a (dyn Fn(u64, u64) + Sync),
     scene: Scene,
 }
 
@@ -736,10 +764,12 @@ impl Loader<'_> {
             };
             let mut primitives = Vec::new();
             for (p, primitive) in mesh.primitives.iter().enumerate() {
+                let extent = self.claimed_triangles(primitive);
                 if let Some(mut primitive) = self.primitive(primitive, &what(p))? {
                     (primitive.source.mesh, primitive.source.primitive) = (m, p);
                     primitives.push(primitive);
                 }
+                (self.watch)(0, extent);
             }
             for (skin, range) in poses {
                 let first = self.scene.primitives.len();
@@ -1239,7 +1269,8 @@ impl Loader<'_> {
     }
 
     /// Decodes the images that materials use, and reads the runtime textures.
-    fn images(&mut self, resolve: &Resolver<'_>) -> Result<(), Error> {
+    /// Which images are drawn, and which are engine textures beside them.
+    fn needed_images(&self) -> (Vec<bool>, Vec<bool>) {
         let count = self.root.images.len();
         let (mut drawn, mut runtime) = (vec![false; count], vec![false; count]);
         let maps = self.needs.maps;
@@ -1249,17 +1280,47 @@ impl Loader<'_> {
                 runtime[image] = true;
             }
         }
+        (drawn, runtime)
+    }
+
+    /// Triangles of a primitive, as the document claims.
+    fn claimed_triangles(&self, primitive: &json::Primitive) -> u64 {
+        let accessor = primitive.indices.or(primitive.attributes.position);
+        accessor.and_then(|accessor| self.root.accessors.get(accessor)).map_or(0, |a| a.count / 3)
+    }
+
+    /// All that is to be read, in triangles.
+    fn extent(&self) -> u64 {
+        let (drawn, runtime) = self.needed_images();
+        let images = drawn.into_iter().chain(runtime).filter(|&needed| needed).count() as u64;
+        let primitives = self.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+        let triangles = primitives.filter(|_| self.needs.geometry).map(|p| self.claimed_triangles(p));
+        triangles.fold(images * IMAGE, u64::saturating_add)
+    }
+
+    fn images(&mut self, resolve: &Resolver<'_>) -> Result<(), Error> {
+        let (drawn, runtime) = self.needed_images();
         let texels = AtomicU64::new(0);
         let images: Result<Vec<_>, Error> = (drawn.par_iter().enumerate())
-            .map(
-                |(i, &used)| {
-                    if used { self.image(i, &texels, resolve).map(|i| Some(Arc::new(i))) } else { Ok(None) }
-                },
-            )
+            .map(|(i, &used)| {
+                if !used {
+                    return Ok(None);
+                }
+                let image = self.image(i, &texels, resolve)?;
+                (self.watch)(0, IMAGE);
+                Ok(Some(Arc::new(image)))
+            })
             .collect();
         self.scene.images = images?;
         let textures: Vec<_> = (runtime.into_par_iter().enumerate())
-            .map(|(i, used)| if used { self.runtime_texture(i, resolve).map(Some) } else { Ok(None) })
+            .map(|(i, used)| {
+                if !used {
+                    return Ok(None);
+                }
+                let texture = self.runtime_texture(i, resolve);
+                (self.watch)(0, IMAGE);
+                texture.map(Some)
+            })
             .collect();
         for (texture, drawn) in textures.into_iter().zip(drawn) {
             let texture = match texture {

@@ -47,10 +47,10 @@ impl Backend {
                 Ok(Painter::Gpu(Box::new(open()?)))
             }
             #[cfg(not(feature = "gpu"))]
-            Backend::Gpu => Err(Error::Usage(
-                "--backend gpu: this kinran was built without a GPU renderer; build it with `cargo build --release -p \
-                kinran --features gpu`, or use --backend cpu"
-                    .into(),
+            Backend::Gpu => Err(Error::flag_error(
+                "--backend gpu",
+                "this kinran was built without a GPU renderer; build it with `cargo build --release -p kinran --features \
+                 gpu`, or use --backend cpu",
             )),
         }
     }

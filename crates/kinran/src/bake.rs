@@ -23,7 +23,7 @@ use self::flags::{Flag, On};
 use crate::content::Content;
 use crate::init::{MANIFEST, Survey};
 use crate::model::ModelArgs;
-use crate::outputs::{Space, check_folder, has_extension};
+use crate::outputs::{Space, beside, check_folder, has_extension};
 use crate::values::{filter, number};
 use crate::{Console, Error};
 
@@ -402,12 +402,14 @@ impl Args {
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if !args.input.is_dir() && has_extension(&args.input, "toml") {
         if let Some(flag) = Flag::given(args, |on| on == On::One) {
-            return Err(Error::Usage(format!("--{} {}; leave it out", flag.name, flag.refusal())));
+            let reason = format!("{}; leave it out", flag.refusal());
+            return Err(Error::flag_error_of(&args.input, format!("--{}", flag.name), reason));
         }
         return bake_library(args, console);
     }
     if let Some(flag) = Flag::given(args, |on| on == On::Library) {
-        return Err(Error::Usage(format!("--{} {}; name one, or leave it out", flag.name, flag.refusal())));
+        let reason = format!("{}; name one, or leave it out", flag.refusal());
+        return Err(Error::flag_error_of(&args.input, format!("--{}", flag.name), reason));
     }
     check_formats(args)?;
     let gltf = is_gltf(&args.input);
@@ -419,15 +421,17 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         return Err(Error::file_error(&args.input, reason));
     }
     let nowhere = args.output.is_none() && !args.dry_run;
-    let args =
-        &Args { output: Some(args.output.clone().unwrap_or_else(|| beside(&args.input))), ..args.clone() };
+    let args = &Args {
+        output: Some(args.output.clone().unwrap_or_else(|| beside(&args.input, "baked"))),
+        ..args.clone()
+    };
     if !args.dry_run {
         check_folder(args.output())?;
     }
     let gltf = gltf && !args.input.is_dir();
     if let Some(flag) = args.idle_flag(gltf) {
-        let reason = format!("--{} {}; leave the flag out", flag.name, flag.refusal());
-        return Err(Error::file_error(&args.input, reason));
+        let reason = format!("{}; leave the flag out", flag.refusal());
+        return Err(Error::flag_error_of(&args.input, format!("--{}", flag.name), reason));
     }
     match (gltf, args.dry_run) {
         (false, false) => folder::run(args, console).map_err(|e| with_a_way(e, console)),
@@ -439,13 +443,6 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         console.note(format!("no --output was given: the files went to {}", args.output().display()));
     }
     Ok(())
-}
-
-/// The output where nobody says one: `baked` in the folder that the input is in.
-fn beside(input: &Path) -> PathBuf {
-    // "." and ".." have no parent in their names.
-    let full = input.file_name().is_none().then(|| input.canonicalize().ok()).flatten();
-    full.as_deref().unwrap_or(input).parent().unwrap_or(Path::new("")).join("baked")
 }
 
 /// The error of a folder without maps; where there is something to bake below it, the way to do that.
@@ -476,8 +473,9 @@ fn check_formats(args: &Args) -> Result<(), Error> {
         ("--color-format", args.color_format, 3, "colour needs red, green and blue"),
     ];
     if args.color_format == Some(FormatName::Rgba16f) {
-        return Err(Error::Usage(
-            "--color-format rgba16f: colour maps hold 8 bits; choose bc7, bc1 or rgba8".into(),
+        return Err(Error::flag_error(
+            "--color-format rgba16f",
+            "colour maps hold 8 bits; choose bc7, bc1 or rgba8",
         ));
     }
     for (flag, format, channels, reason) in wanted {
@@ -487,7 +485,8 @@ fn check_formats(args: &Args) -> Result<(), Error> {
             _ => continue,
         };
         if has < channels {
-            return Err(Error::Usage(format!("{flag} {name}: {reason}; choose bc7, bc1, rgba8 or rgba16f")));
+            let reason = format!("{reason}; choose bc7, bc1, rgba8 or rgba16f");
+            return Err(Error::flag_error(format!("{flag} {name}"), reason));
         }
     }
     Ok(())
@@ -512,20 +511,15 @@ fn texture_files(args: &Args, name: &str) -> Vec<String> {
     args.container.extensions().iter().map(|extension| format!("{name}.{extension}")).collect()
 }
 
-/// What Zstandard leaves of a mip chain at least, as one over this; chosen by eye: BC7 of smooth maps keeps an eighth.
-const ZSTD_LEAST: u64 = 16;
+/// Texels of all levels.
+fn mip_texels((width, height): (u32, u32)) -> u64 {
+    let levels = 0..full_level_count(width, height);
+    levels.map(|level| u64::from(level_size(width, level)) * u64::from(level_size(height, level))).sum()
+}
 
 /// Bytes of a texture's files.
-fn texture_space(args: &Args, format: Format, (width, height): (u32, u32)) -> Space {
-    let levels = 0..full_level_count(width, height);
-    let chain = levels.map(|level| format.level_bytes(level_size(width, level), level_size(height, level)));
-    let chain = chain.sum::<usize>() as u64;
-    let mut space = Space::default();
-    for extension in args.container.extensions() {
-        let shrinks = *extension == "ktx2" && args.zstd > 0;
-        space.add(Space { least: if shrinks { chain / ZSTD_LEAST } else { chain }, most: chain });
-    }
-    space
+fn texture_space(args: &Args, format: Format, size: (u32, u32)) -> Space {
+    Space::of_texture(args.container, args.zstd, format, size)
 }
 
 /// Writes a texture in the containers asked for; gives the reports of the files.

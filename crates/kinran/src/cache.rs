@@ -51,17 +51,20 @@ pub struct CacheReport {
 /// Runs the command.
 ///
 /// # Errors
-/// [`Error::Usage`] where there is no cache, [`Error::Image`] where it cannot be read or changed.
+/// [`Error::Flag`] or [`Error::File`] where there is no cache, [`Error::Image`] where it cannot be read or changed.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let library = LibraryArgs { cache: args.cache.clone(), ..LibraryArgs::default() };
     let folder = cache_folder(&library, None).ok_or_else(|| {
-        Error::Usage("there is no HOME to look for the cache in; name its folder with --cache".into())
+        Error::flag_error(
+            "--cache",
+            "is missing, and there is no HOME to look for the cache in; name its folder",
+        )
     })?;
     let cache = Cache::open(&folder)?;
     // Whoever looks for a cache in the wrong place should not find an empty one.
     if !Cache::is_cache(&folder) {
         if args.cache.is_some() {
-            return Err(Error::Usage(format!("{}: is no cache; name another folder", folder.display())));
+            return Err(Error::file_error(&folder, "is no cache; name another folder"));
         }
         let report =
             CacheReport { folder: folder.clone(), bytes: 0, entries: vec![], removed: 0, removed_bytes: 0 };

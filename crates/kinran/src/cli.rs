@@ -120,7 +120,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
             let error = shortened(error);
             if error.use_stderr() && asks_for_json(&words) {
                 let console = Console { json: true, ..Console::default() };
-                let said = Error::Usage(sentence(&error));
+                let said = misunderstood(&error);
                 console.failure(&said);
                 return ExitCode::from(said.exit_code());
             }
@@ -164,15 +164,15 @@ fn with_runtime_folder(_: &[OsString]) {}
 fn do_command(command: &Command, console: &Console) -> Result<(), Error> {
     match command {
         Command::Demo(args) => demo::run(args, console),
-        Command::Bake(args) => bake::run(args, console),
+        Command::Bake(args) => bake::run(args, console).map_err(|e| e.about(&args.input)),
         Command::Init(args) => init::run(args, console),
         Command::Cache(args) => cache::run(args, console),
-        Command::Render(args) => render::run(args, console),
-        Command::Compare(args) => compare::run(args, console),
+        Command::Render(args) => render::run(args, console).map_err(|e| e.about(&args.file)),
+        Command::Compare(args) => compare::run(args, console).map_err(|e| e.about(&args.file)),
         Command::Detail(args) => detail::run(args, console),
-        Command::Inspect(args) => inspect::run(args, console),
+        Command::Inspect(args) => inspect::run(args, console).map_err(|e| e.about(&args.file)),
         Command::Fit(args) => fit::run(args, console),
-        Command::Fuzz(args) => fuzz_sheet::run(args, console),
+        Command::Fuzz(args) => fuzz_sheet::run(args, console).map_err(|e| e.about(&args.file)),
         #[cfg(feature = "view")]
         Command::View(args) => viewer::run(args, console),
         #[cfg(not(feature = "view"))]
@@ -182,7 +182,7 @@ fn do_command(command: &Command, console: &Console) -> Result<(), Error> {
                 .into(),
         )),
         Command::Shaders(args) => shaders::run(args, console),
-        Command::Skin(args) => skin_sheet::run(args, console),
+        Command::Skin(args) => skin_sheet::run(args, console).map_err(|e| e.about(&args.file)),
         Command::SkinLut(args) => skin_lut::run(args, console),
         Command::Completions(args) => completions::run(args, console),
         Command::Man(args) => completions::run_man(args, console),
@@ -194,7 +194,7 @@ fn start_threads(threads: Option<u16>) -> Result<(), Error> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads.into())
         .build_global()
-        .map_err(|e| Error::Usage(format!("--threads {threads}: {e}; ask for fewer")))
+        .map_err(|e| Error::flag_error(format!("--threads {threads}"), format!("{e}; ask for fewer")))
 }
 
 /// Whether `--json` stands among the words, which were not understood.
@@ -221,6 +221,20 @@ fn shortened(mut error: clap::Error) -> clap::Error {
         error.insert(kind, value);
     }
     error
+}
+
+/// An error about words as one of ours.
+fn misunderstood(error: &clap::Error) -> Error {
+    let message = sentence(error);
+    let about = match error.get(ContextKind::InvalidArg) {
+        Some(ContextValue::String(argument)) => Some(argument),
+        Some(ContextValue::Strings(arguments)) => arguments.first(),
+        _ => None,
+    };
+    match about.and_then(|argument| argument.split([' ', '=']).next()) {
+        Some(flag) => Error::Flag { flag: flag.to_owned(), file: None, message },
+        None => Error::Usage(message),
+    }
 }
 
 /// What is wrong with a flag and what might have been meant, in one line.

@@ -6,18 +6,19 @@ use kinran_bake::aniso::Filter;
 use kinran_image::write_atomically;
 use kinran_render::metrics::{flip, rmse_linear, rmse_srgb8};
 use kinran_render::reference::{Film, RenderScene, SurfaceTextures, TextureFiltering};
-use kinran_scene::Scene;
+use kinran_scene::{Needs, Scene};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::compare_sheet::{comparison_sheet, distance_sheet};
+use crate::model::read_scene;
 use crate::picture::Picture;
 use crate::ranking::{Errors, FLIP_BEND, Order, order};
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::table::table;
 use crate::values::{filter, number};
-use crate::view::{Samples, View, ViewArgs, file_name};
+use crate::view::{Samples, View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, outputs};
 
 /// Compares filters with ground truth, in pictures and numbers
@@ -42,9 +43,9 @@ pub struct Args {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
-    /// The folder for pictures and numbers
+    /// The folder for pictures and numbers [default: NAME.compare beside the input]
     #[arg(long, short, value_name = "DIR")]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
 
     /// Filters, in the order of the columns: ml, linear, param, lean, naive
     #[arg(long, value_name = "A,B,C", value_delimiter = ',', default_value = "ml,linear,lean,naive",
@@ -219,13 +220,14 @@ pub struct Comparison {
 /// One that names the file: input that cannot be read, output that cannot be written, flags that do not fit
 /// the file.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    outputs::check_folder(&args.output)?;
+    let output = args.output.clone().unwrap_or_else(|| outputs::named_after(&args.file, ".compare"));
+    outputs::check_folder(&output)?;
     let series = std::iter::once("truth").chain(args.filters.iter().map(|filter| filter.name()));
     let pictures =
         series.flat_map(|name| args.distances.iter().map(move |distance| picture_file(name, *distance)));
     let pictures = pictures.chain(["compare.png".into(), "distance.png".into()]);
-    args.view.refuse_inputs(&args.file, pictures.map(|picture| args.output.join(picture)))?;
-    let scene = Scene::load_allowing(&args.file, args.view.model.allowed()?)?;
+    args.view.refuse_inputs(&args.file, pictures.map(|picture| output.join(picture)))?;
+    let scene = read_scene(&args.file, &args.view.model, &Needs::ALL, &console.progress())?;
     let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
     let options = Options {
         filters: distinct(&args.filters),
@@ -238,9 +240,11 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     };
     let comparison = compare(&scene, &file_name(&args.file), &options, &console.progress())?;
     comparison.report.warnings.iter().for_each(|w| console.warn(w));
-    comparison.write(&args.output)?;
-    let text = format!("{}\nPictures and numbers are in {}", comparison.table(), args.output.display());
-    console.result(&comparison.report, &text)
+    comparison.write(&output)?;
+    let text = format!("{}\nPictures and numbers are in {}", comparison.table(), output.display());
+    console.result(&comparison.report, &text)?;
+    outputs::tell_place(console, args.output.as_deref(), &output);
+    Ok(())
 }
 
 /// The name of a picture of a filter or of ground truth.
@@ -278,7 +282,13 @@ pub fn compare(
     let views: Vec<View> = distances.iter().map(|&d| options.view.zoomed_out(d)).collect();
     // A pixel far away covers more of the model and needs more samples.
     let half = |samples: u32, distance: f32| ((samples as f32 * distance) as u32).div_ceil(2);
-    // All the pictures of one method that are still wanted, with as many samples as they have, or their first.
+    // Samples of a half that are drawn next: as many as there are, or the first.
+    let next = |taken: &[Taken], samples: u32, i: usize| {
+        taken.get(i).map_or_else(|| half(samples, distances[i]), |taken| taken.of_half)
+    };
+    let all = (!progress.has_overall()).then(|| progress.busy("comparing"));
+    let progress = &all.as_ref().map_or_else(|| progress.clone(), |all| progress.overall(all));
+    // All the pictures of one method that are still wanted.
     let draw = |taken: &mut Vec<Taken>, prepared: &RenderScene, mips: Mips, open: &[usize]| {
         let (samples, filtering) = match mips {
             Mips::Level0 => (options.truth_samples_per_pixel, TextureFiltering::Level0),
@@ -289,7 +299,7 @@ pub fn compare(
         for &i in open {
             let name = format!("{}, distance {}", mips.name(), distances[i]);
             let first = taken.get(i).map_or(0, |taken| taken.of_half);
-            let count = if first > 0 { first } else { half(samples, distances[i]) };
+            let count = next(taken, samples, i);
             let half = |seed| {
                 let samples = Samples { first, count, seed };
                 views[i].render_samples(prepared, &name, samples, filtering, progress)
@@ -313,6 +323,15 @@ pub fn compare(
     let mut findings: Vec<Finding> = Vec::new();
     let mut open: Vec<usize> = (0..distances.len()).collect();
     while !open.is_empty() {
+        let samples = |i: usize| {
+            let samples = |taken: &[Taken], first| samples_of(views[i].size, 2 * next(taken, first, i));
+            let of_filter = |drawn: &Vec<Taken>| samples(drawn, options.samples_per_pixel);
+            let of_truth = samples(&truth, options.truth_samples_per_pixel);
+            of_truth + drawn.iter().map(of_filter).sum::<u64>()
+        };
+        if let Some(all) = &all {
+            all.expect(open.iter().map(|&i| samples(i)).sum());
+        }
         if !findings.is_empty() {
             set_surfaces(&mut prepared, scene_surfaces(scene, Mips::Level0, progress)?.0);
         }

@@ -30,6 +30,9 @@ pub struct Failure {
     /// The file or folder that it is about, where it is about one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
+    /// The flag that it is about, where it is about one, or the argument that is missing: `--size`, `<FILE>`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flag: Option<String>,
     /// The line in the file, from 1, where it is a text.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line: Option<usize>,
@@ -38,6 +41,22 @@ pub struct Failure {
     pub column: Option<usize>,
     /// The program's exit code: 2 where the input or the flags are to blame, 1 where the program is.
     pub exit_code: u8,
+}
+
+impl Failure {
+    /// What programs are told of an error.
+    pub fn of(error: &Error) -> Self {
+        let (line, column) = error.line_and_column().unzip();
+        Failure {
+            code: error.code(),
+            message: one_line(&error.to_string()),
+            file: error.file().map(Path::to_path_buf),
+            flag: error.flag(),
+            line,
+            column,
+            exit_code: error.exit_code(),
+        }
+    }
 }
 
 /// The document that `--json` prints where there is no result.
@@ -119,17 +138,8 @@ impl Console {
             self.tell(snippet);
         }
         if self.json && !matches!(error, Error::Entries { .. } | Error::Stdout(_)) {
-            let (line, column) = error.line_and_column().unzip();
-            let failure = Failure {
-                code: error.code(),
-                message: one_line(&error.to_string()),
-                file: error.file().map(Path::to_path_buf),
-                line,
-                column,
-                exit_code: error.exit_code(),
-            };
             // Where standard output is closed, standard error has told it.
-            let _ = self.result(&Failed { error: failure }, "");
+            let _ = self.result(&Failed { error: Failure::of(error) }, "");
         }
     }
 

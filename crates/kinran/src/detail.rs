@@ -14,6 +14,7 @@ use crate::{Console, Error};
 
 pub use layer_flag::LayerFlag;
 pub use library::{LibraryArgs, LibraryReport, report_library};
+pub(crate) use solve::space;
 pub use solve::{SolveArgs, SolveReport, solve_target};
 
 /// Splits a map into tiled layers and a map that turns them into it
@@ -39,8 +40,8 @@ enum Command {
 /// Whatever is wrong with the input, the flags or the output folder; nothing half-written stays.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     match &args.command {
-        Command::Solve(args) => solve::run(args, console),
-        Command::Report(args) => library::run(args, console),
+        Command::Solve(args) => solve::run(args, console).map_err(|e| e.about(&args.target)),
+        Command::Report(args) => library::run(args, console).map_err(|e| e.about(&args.folder)),
     }
 }
 

@@ -1,11 +1,23 @@
 use std::path::{Path, PathBuf};
 
+use crate::Failure;
+
 /// Why a command failed. The message is one line: what is wrong where, and what to do about it.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A flag or a combination of flags cannot be served.
+    /// Words that cannot be served, and about no one flag or file.
     #[error("{0}")]
     Usage(String),
+    /// A flag cannot be served, alone or together with others.
+    #[error("{message}")]
+    Flag {
+        /// The flag, or the argument that is missing, as help names it: `--size`, `<FILE>`.
+        flag: String,
+        /// The file or folder that it does not suit.
+        file: Option<PathBuf>,
+        /// What is wrong, and what to do about it.
+        message: String,
+    },
     /// A file or folder is not what a command takes.
     #[error("{}: {reason}", path.display())]
     File {
@@ -37,6 +49,17 @@ pub enum Error {
     /// A picture could not be rendered.
     #[error(transparent)]
     Render(#[from] kinran_render::Error),
+    /// What went wrong with a file or folder, where the error itself does not name it.
+    #[error("{}: {error}", path.display())]
+    About {
+        /// The file or folder.
+        path: PathBuf,
+        /// What went wrong.
+        error: Box<Error>,
+    },
+    /// What went wrong with a copy of files, told as of the files themselves.
+    #[error("{}", .0.message)]
+    Retold(Box<Failure>),
     /// Standard output could not be written.
     #[error("standard output: {0}; send it elsewhere")]
     Stdout(#[from] std::io::Error),
@@ -59,8 +82,43 @@ impl Error {
     pub fn snippet(&self) -> Option<&str> {
         match self {
             Error::Manifest(error) => Some(&error.snippet),
+            Error::About { error, .. } => error.snippet(),
             _ => None,
         }
+    }
+
+    /// An [`Error::Flag`]; `given` is the flag with what was given to it, if anything was.
+    pub fn flag_error(given: impl Into<String>, reason: impl std::fmt::Display) -> Self {
+        let given = given.into();
+        Error::Flag { message: format!("{given}: {reason}"), flag: flag_of(&given), file: None }
+    }
+
+    /// The same of a flag that does not suit a file.
+    pub fn flag_error_of(
+        path: impl AsRef<Path>,
+        given: impl Into<String>,
+        reason: impl std::fmt::Display,
+    ) -> Self {
+        let (path, given) = (path.as_ref(), given.into());
+        let message = format!("{}: {given}: {reason}", path.display());
+        Error::Flag { message, flag: flag_of(&given), file: Some(path.to_path_buf()) }
+    }
+
+    /// The error with the file or folder that it is about, where it names none itself.
+    pub fn about(self, path: impl AsRef<Path>) -> Self {
+        use kinran_render::Error as RenderError;
+        let may_lack_one = matches!(
+            self,
+            Error::Usage(_)
+                | Error::Folder(_)
+                | Error::Image(_)
+                | Error::Scene(_)
+                | Error::Render(RenderError::Scene(_))
+        );
+        if may_lack_one && self.file().is_none() && self.flag().is_none() {
+            return Error::About { path: path.as_ref().to_path_buf(), error: Box::new(self) };
+        }
+        self
     }
 
     /// An [`Error::File`] about `path`.
@@ -83,7 +141,9 @@ impl Error {
             }
         }
         match self {
-            Error::Usage(_) | Error::Folder(FolderError::Flag { .. }) => "usage",
+            Error::About { error, .. } => error.code(),
+            Error::Retold(failure) => failure.code,
+            Error::Usage(_) | Error::Flag { .. } | Error::Folder(FolderError::Flag { .. }) => "usage",
             Error::Render(RenderError::Setting { .. }) => "usage",
             Error::File { .. } | Error::Folder(FolderError::NotAFolder(_)) => "input",
             Error::Scene(kinran_scene::Error::Outside { .. }) => "input",
@@ -107,7 +167,9 @@ impl Error {
     pub fn file(&self) -> Option<&Path> {
         use kinran_bake::folder::FolderError;
         match self {
-            Error::File { path, .. } => Some(path),
+            Error::File { path, .. } | Error::About { path, .. } => Some(path),
+            Error::Flag { file, .. } => file.as_deref(),
+            Error::Retold(failure) => failure.file.as_deref(),
             Error::Image(error)
             | Error::Folder(FolderError::Image(error))
             | Error::Scene(kinran_scene::Error::Image(error)) => match error {
@@ -119,7 +181,8 @@ impl Error {
             Error::Scene(
                 kinran_scene::Error::Io { path, .. }
                 | kinran_scene::Error::Malformed { path, .. }
-                | kinran_scene::Error::Unsupported { path, .. },
+                | kinran_scene::Error::Unsupported { path, .. }
+                | kinran_scene::Error::Outside { path, .. },
             ) => Some(path),
             Error::Folder(
                 FolderError::NotAFolder(path)
@@ -131,9 +194,23 @@ impl Error {
         }
     }
 
+    /// The flag that it is about, without what was given to it, or the argument that is missing.
+    pub fn flag(&self) -> Option<String> {
+        use kinran_bake::folder::FolderError;
+        match self {
+            Error::Flag { flag, .. } => Some(flag.clone()),
+            Error::Folder(FolderError::Flag { flag, .. }) => Some(flag_of(flag)),
+            Error::About { error, .. } => error.flag(),
+            Error::Retold(failure) => failure.flag.clone(),
+            _ => None,
+        }
+    }
+
     /// The place in a manifest, from 1.
     pub fn line_and_column(&self) -> Option<(usize, usize)> {
         match self {
+            Error::About { error, .. } => error.line_and_column(),
+            Error::Retold(failure) => failure.line.zip(failure.column),
             Error::Manifest(error) => Some((error.line, error.column)),
             _ => None,
         }
@@ -142,8 +219,15 @@ impl Error {
     /// 2 where the input or the flags are to blame, 1 where the program is.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Error::About { error, .. } => error.exit_code(),
+            Error::Retold(failure) => failure.exit_code,
             Error::Internal(_) | Error::Render(kinran_render::Error::SizeMismatch { .. }) => 1,
             _ => 2,
         }
     }
+}
+
+/// The flag at the beginning of what was given.
+fn flag_of(given: &str) -> String {
+    given.split([' ', '=']).next().unwrap_or(given).to_owned()
 }

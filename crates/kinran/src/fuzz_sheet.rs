@@ -50,9 +50,9 @@ pub struct Args {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
-    /// The folder for the sheets
+    /// The folder for the sheets [default: NAME.fuzz beside the input]
     #[arg(long, short, value_name = "DIR")]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
 
     /// Draws these sheets; all but realtime by default
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAMES")]
@@ -183,21 +183,22 @@ struct Difference {
 /// # Errors
 /// One that names the flag or the file.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    outputs::check_folder(&args.output)?;
+    let output = args.output.clone().unwrap_or_else(|| outputs::named_after(&args.file, ".fuzz"));
+    outputs::check_folder(&output)?;
     let (base, roughness) = match args.base {
         Base::Own => (None, args.roughness),
         Base::Color(color) => (Some(color), Some(args.roughness.unwrap_or(BASE_ROUGHNESS))),
     };
     for (flag, color) in [("--color", Some(args.color)), ("--base", base)] {
         if let Some(Vec3 { x, y, z }) = color.filter(|c| c.min_element() < 0.0 || c.max_element() > 1.0) {
-            return Err(Error::Usage(format!("{flag} {x},{y},{z}: each must lie in 0 to 1")));
+            return Err(Error::flag_error(format!("{flag} {x},{y},{z}"), "each must lie in 0 to 1"));
         }
     }
     let sheets = match args.sheet.as_slice() {
         [] => Sheet::value_variants().iter().copied().filter(|&s| s != Sheet::Realtime).collect(),
         named => named.to_vec(),
     };
-    let pictures = sheets.iter().map(|&sheet| args.output.join(sheet_file(sheet)));
+    let pictures = sheets.iter().map(|&sheet| output.join(sheet_file(sheet)));
     args.view.refuse_inputs(&args.file, pictures)?;
     let painter = args.backend.open(None)?;
     let realtime = match sheets.contains(&Sheet::Realtime) {
@@ -205,8 +206,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         false => None,
     };
     let progress = console.progress();
-    let reading = progress.busy(format!("reading {}", file_name(&args.file)));
-    let Model { path, mut scene, only_baked } = Model::open(&args.file, &args.view.model)?;
+    let Model { path, mut scene, only_baked } = Model::open(&args.file, &args.view.model, &progress)?;
     for material in &mut scene.materials {
         if let Some(base) = base {
             material.base_color_factor = base.extend(material.base_color_factor.w);
@@ -218,7 +218,6 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         }
     }
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
-    drop(reading);
     let mips = if only_baked { Mips::Baked } else { Mips::Filtered(Filter::Linear) };
     let (surfaces, apart) = scene_surfaces(&scene, mips, &progress)?;
     let prepared = view.scene(&scene, surfaces)?;
@@ -237,7 +236,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     };
     let studio = Studio { args, prepared, view, parameters, painter, progress: &progress };
 
-    std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
+    std::fs::create_dir_all(&output).map_err(|e| kinran_image::Error::io(&output, e))?;
     let mut text = String::new();
     let (mut files, mut flip) = (Vec::new(), Vec::new());
     let all = progress.stage("sheets", sheets.len() as u64);
@@ -251,7 +250,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             }
             _ => studio.sheet(sheet)?,
         };
-        picture.write(&args.output.join(&name))?;
+        picture.write(&output.join(&name))?;
         files.push(name);
         all.add(1);
     }
@@ -259,9 +258,11 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     for Difference { light, flip } in &flip {
         writeln!(text, "FLIP {flip:.4}: {light}").expect("strings grow");
     }
-    write!(text, "{} sheets of {} are in {}", files.len(), file_name(&args.file), args.output.display())
+    write!(text, "{} sheets of {} are in {}", files.len(), file_name(&args.file), output.display())
         .expect("strings grow");
-    console.result(&Summary { files, flip, warnings }, &text)
+    console.result(&Summary { files, flip, warnings }, &text)?;
+    outputs::tell_place(console, args.output.as_deref(), &output);
+    Ok(())
 }
 
 /// The name of a sheet's picture.
@@ -403,8 +404,8 @@ impl Studio<'_> {
             pictures.insert(at, (format!("{light}, reference"), reference));
         }
         if differences.is_empty() {
-            let fix = "leave --env none out, or give --light X,Y,Z";
-            return Err(Error::Usage(format!("--sheet realtime: no light to compare in; {fix}")));
+            let reason = "no light to compare in; leave --env none out, or give --light X,Y,Z";
+            return Err(Error::flag_error("--sheet realtime", reason));
         }
         Ok((grid(&[Row { name: String::new(), cells: pictures }]), differences))
     }

@@ -5,11 +5,14 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
 use kinran_image::{Channels, Image, Pixels, read_texture};
-use kinran_scene::{Anisotropy, Instance, Material, Primitive, Scene, Source, TextureRef, Wrap, is_gltf};
+use kinran_scene::{
+    Anisotropy, Instance, Material, Needs, Primitive, Scene, Source, TextureRef, Wrap, is_gltf,
+};
 use serde::Deserialize;
 
-use crate::Error;
 use crate::content::Content;
+use crate::view::file_name;
+use crate::{Error, Progress};
 
 /// The flag about files that a model names.
 #[derive(Clone, Debug, Default, PartialEq, Eq, clap::Args)]
@@ -24,13 +27,13 @@ impl ModelArgs {
     /// The folders that are allowed.
     ///
     /// # Errors
-    /// [`Error::Usage`] where one does not exist.
+    /// [`Error::Flag`] where one does not exist.
     pub fn allowed(&self) -> Result<&[PathBuf], Error> {
         match self.allow_outside.iter().find(|folder| !folder.is_dir()) {
-            Some(folder) => Err(Error::Usage(format!(
-                "--allow-outside {}: there is no such folder; name one that exists",
-                folder.display()
-            ))),
+            Some(folder) => {
+                let given = format!("--allow-outside {}", folder.display());
+                Err(Error::flag_error(given, "there is no such folder; name one that exists"))
+            }
             None => Ok(&self.allow_outside),
         }
     }
@@ -85,7 +88,7 @@ impl Place {
     /// read yet.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a path that does not exist and a folder with nothing to show, or with several models.
+    /// [`Error::File`] for a path that does not exist and a folder with nothing to show, or with several models.
     pub fn of(path: &Path) -> Result<Self, Error> {
         let complain = |e: &dyn std::fmt::Display| Error::file_error(path, e.to_string());
         if !path.exists() {
@@ -124,10 +127,10 @@ impl Model {
     ///
     /// # Errors
     /// Those of [`Place::of`] and of the files.
-    pub fn open(path: &Path, args: &ModelArgs) -> Result<Self, Error> {
+    pub fn open(path: &Path, args: &ModelArgs, progress: &Progress) -> Result<Self, Error> {
         match Place::of(path)? {
             Place::File(path) => {
-                let scene = Scene::load_allowing(&path, args.allowed()?)?;
+                let scene = read_scene(&path, args, &Needs::ALL, progress)?;
                 Ok(Model { path, scene, only_baked: false })
             }
             Place::Textures(path, sidecars) => {
@@ -138,14 +141,31 @@ impl Model {
     }
 }
 
+/// Reads a model with a bar.
+///
+/// # Errors
+/// Those of [`Scene::load`], and of the flag.
+pub(crate) fn read_scene(
+    path: &Path,
+    args: &ModelArgs,
+    needs: &Needs,
+    progress: &Progress,
+) -> Result<Scene, Error> {
+    let reading = progress.busy(format!("reading {}", file_name(path)));
+    let watch = |expected, done| {
+        reading.expect(expected);
+        reading.add(done);
+    };
+    Ok(Scene::load_watched(path, args.allowed()?, needs, &watch)?)
+}
+
 /// A board for each material of the sidecars, side by side along x, facing +z.
 fn boards(folder: &Path, sidecars: &[PathBuf]) -> Result<Scene, Error> {
     let mut scene = Scene::default();
     for sidecar in sidecars {
-        let text = std::fs::read_to_string(sidecar)
-            .map_err(|e| Error::Usage(format!("{}: {e}", sidecar.display())))?;
+        let text = std::fs::read_to_string(sidecar).map_err(|e| kinran_image::Error::io(sidecar, e))?;
         let read: Sidecar = serde_json::from_str(&text).map_err(|e| {
-            Error::Usage(format!("{}: not what `kinran bake` writes: {e}; bake again", sidecar.display()))
+            Error::file_error(sidecar, format!("not what `kinran bake` writes: {e}; bake again"))
         })?;
         for surface in read.surfaces {
             let material = material(folder, surface, &mut scene)?;
@@ -167,10 +187,10 @@ fn beside(folder: &Path, file: &str) -> Result<PathBuf, Error> {
     let mut parts = Path::new(file).components();
     match (parts.next(), parts.next()) {
         (Some(Component::Normal(_)), None) if !file.contains('\\') => Ok(folder.join(file)),
-        _ => Err(Error::Usage(format!(
-            "{}: a sidecar names \"{file}\", which does not lie beside it; bake again",
-            folder.display()
-        ))),
+        _ => {
+            let reason = format!("a sidecar names \"{file}\", which does not lie beside it; bake again");
+            Err(Error::file_error(folder, reason))
+        }
     }
 }
 
@@ -253,7 +273,7 @@ mod tests {
         let sidecars = vec![folder.path().join("a.kinran.json")];
         assert_eq!(of(folder.path()), Ok(Place::Textures(folder.path().into(), sidecars)));
         assert!(
-            Model::open(folder.path(), &ModelArgs::default())
+            Model::open(folder.path(), &ModelArgs::default(), &Progress::new(false))
                 .unwrap_err()
                 .to_string()
                 .contains("a.kinran.json")

@@ -4,15 +4,38 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use kinran_image::{Format, full_level_count, level_size};
 use kinran_scene::Packed;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
+use crate::bake::Container;
+use crate::{Console, Error};
 
 /// Whether a path ends in `.extension`, in any case.
 pub(crate) fn has_extension(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}
+
+/// `name` in the folder that the input is in: where files go that nobody names a place for.
+pub(crate) fn beside(input: &Path, name: &str) -> PathBuf {
+    // "." and ".." have no parent in their names.
+    let full = input.file_name().is_none().then(|| input.canonicalize().ok()).flatten();
+    full.as_deref().unwrap_or(input).parent().unwrap_or(Path::new("")).join(name)
+}
+
+/// What is called after the input and stands beside it: `lamp.render.png` beside `lamp.glb` or a folder `lamp`.
+pub(crate) fn named_after(input: &Path, ending: &str) -> PathBuf {
+    let full = input.canonicalize().unwrap_or_else(|_| input.to_path_buf());
+    let name = if full.is_dir() { full.file_name() } else { full.file_stem() };
+    beside(input, &format!("{}{ending}", name.unwrap_or_default().to_string_lossy()))
+}
+
+/// Tells where files went that nobody named a place for.
+pub(crate) fn tell_place(console: &Console, named: Option<&Path>, place: &Path) {
+    if named.is_none() {
+        console.note(format!("no --output was given: it went to {}", place.display()));
+    }
 }
 
 /// Refuses a file whose extension is not among `extensions`, that is a folder, or that cannot appear in its
@@ -39,7 +62,9 @@ pub(crate) fn check_file(path: &Path, extensions: &[&str]) -> Result<(), Error> 
 pub(crate) fn check_folder(path: &Path) -> Result<(), Error> {
     let existing = existing_folder(path);
     if !existing.is_dir() {
-        return Err(Error::file_error(existing, "is a file; name a folder"));
+        // As it was typed, unless it is a part of that.
+        let shown = if path.exists() { path } else { &existing };
+        return Err(Error::file_error(shown, "is a file; name a folder"));
     }
     check_writable(&existing)
 }
@@ -66,10 +91,7 @@ pub(crate) fn refuse_input<'a>(
     let Ok(existing) = output.canonicalize() else { return Ok(()) };
     let same = |input: &Path| input.canonicalize().is_ok_and(|input| input == existing);
     if inputs.into_iter().any(same) {
-        return Err(Error::Usage(format!(
-            "{}: is read and would be overwritten; choose another --output",
-            output.display()
-        )));
+        return Err(Error::file_error(output, "is read and would be overwritten; choose another --output"));
     }
     Ok(())
 }
@@ -80,10 +102,7 @@ pub(crate) fn refuse_other_page(page: &Path) -> Result<(), Error> {
     if String::from_utf8_lossy(&text).contains("<title>Kinran") {
         return Ok(());
     }
-    Err(Error::Usage(format!(
-        "{}: is a page that kinran did not write; name another folder with --output",
-        page.display()
-    )))
+    Err(Error::file_error(page, "is a page that kinran did not write; name another folder with --output"))
 }
 
 /// A path from a folder, `/`-separated.
@@ -152,7 +171,7 @@ fn is_report(file: &str) -> bool {
 /// report beside them names, with the hash that it has now, is written again without a question.
 ///
 /// # Errors
-/// [`Error::Usage`] that names the file; also for a folder in the place of a file, which `force` does not help.
+/// [`Error::File`]; also for a folder in the place of a file, which `force` does not help.
 pub(crate) fn refuse_foreign(folder: &Path, files: &[String], force: bool) -> Result<(), Error> {
     let mut known: Option<BTreeSet<WrittenFile>> = None;
     // A report that is none explains why nothing else is known.
@@ -160,10 +179,8 @@ pub(crate) fn refuse_foreign(folder: &Path, files: &[String], force: bool) -> Re
     for file in reports.into_iter().chain(others) {
         let path = folder.join(file);
         if path.is_dir() {
-            return Err(Error::Usage(format!(
-                "{}: is a folder where a file must be written; move it away, or name another folder with --output",
-                path.display()
-            )));
+            let reason = "is a folder where a file must be written; move it away, or name another folder with --output";
+            return Err(Error::file_error(&path, reason));
         }
         if force || !path.exists() {
             continue;
@@ -175,11 +192,9 @@ pub(crate) fn refuse_foreign(folder: &Path, files: &[String], force: bool) -> Re
             known.contains(&WrittenFile::of(folder, file)?)
         };
         if !ours {
-            return Err(Error::Usage(format!(
-                "{}: kinran did not write this file, or it was changed since; move it away, name another folder with \
-                 --output, or overwrite it with --force",
-                path.display()
-            )));
+            let reason = "kinran did not write this file, or it was changed since; move it away, name another folder \
+                          with --output, or overwrite it with --force";
+            return Err(Error::file_error(&path, reason));
         }
     }
     Ok(())
@@ -197,26 +212,71 @@ fn read_report(path: &Path) -> Option<KnownFiles> {
 }
 
 /// Bytes that files will take, as far as that can be told before they are made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Space {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Space {
     /// They take no less.
-    pub(crate) least: u64,
-    /// They take no more, but for what is not told here.
-    pub(crate) most: u64,
+    pub least: u64,
+    /// They take no more, but for small files such as reports.
+    pub most: u64,
 }
 
+/// What Zstandard leaves of a mip chain at least, as one over this; chosen by eye: BC7 of smooth maps keeps an eighth.
+const ZSTD_LEAST: u64 = 16;
+
 impl Space {
+    /// That of files whose size is known.
+    pub(crate) fn exact(bytes: u64) -> Self {
+        Space { least: bytes, most: bytes }
+    }
+
+    /// That of a texture with all its mips; `zstd` is the level of KTX2 files, 0 for none.
+    pub(crate) fn of_texture(
+        container: Container,
+        zstd: i32,
+        format: Format,
+        (width, height): (u32, u32),
+    ) -> Self {
+        let levels = 0..full_level_count(width, height);
+        let chain =
+            levels.map(|level| format.level_bytes(level_size(width, level), level_size(height, level)));
+        let chain = chain.sum::<usize>() as u64;
+        let mut space = Space::default();
+        for extension in container.extensions() {
+            let shrinks = *extension == "ktx2" && zstd > 0;
+            space.add(Space { least: if shrinks { chain / ZSTD_LEAST } else { chain }, most: chain });
+        }
+        space
+    }
+
+    /// What is needed where files of so many bytes make room.
+    pub(crate) fn beyond(self, replaced: u64) -> Self {
+        Space { least: self.least.saturating_sub(replaced), most: self.most.saturating_sub(replaced) }
+    }
+
+    /// As people read it.
+    pub(crate) fn text(self) -> String {
+        match (bytes_text(self.least), bytes_text(self.most)) {
+            (least, most) if least == most => most,
+            (least, most) => format!("{least} to {most}"),
+        }
+    }
+
     pub(crate) fn add(&mut self, other: Space) {
         self.least += other.least;
         self.most += other.most;
     }
 }
 
+/// Bytes of those of `files` that are there already, in `folder`, and make room for the new ones.
+pub(crate) fn replaced_bytes(folder: &Path, files: &[String]) -> u64 {
+    files.iter().filter_map(|file| Some(std::fs::metadata(folder.join(file)).ok()?.len())).sum()
+}
+
 /// Refuses output for which the disk of `folder` has clearly no room. The sentence that it may give is a warning: it
 /// may be too little.
 ///
 /// # Errors
-/// [`Error::Usage`] with both numbers.
+/// [`Error::File`] with both numbers.
 pub(crate) fn check_space(folder: &Path, needed: Space) -> Result<Option<String>, Error> {
     // A disk that does not tell is no reason to stop.
     let Ok(free) = fs4::available_space(existing_folder(folder)) else { return Ok(None) };
@@ -226,10 +286,11 @@ pub(crate) fn check_space(folder: &Path, needed: Space) -> Result<Option<String>
 fn room(folder: &Path, needed: Space, free: u64) -> Result<Option<String>, Error> {
     let (place, free_text) = (folder.display(), bytes_text(free));
     if free < needed.least {
-        return Err(Error::Usage(format!(
-            "{place}: the files take at least {} and {free_text} are free; free some space or choose another disk",
+        let reason = format!(
+            "the files take at least {} and {free_text} are free; free some space or choose another disk",
             bytes_text(needed.least)
-        )));
+        );
+        return Err(Error::file_error(folder, reason));
     }
     Ok((free < needed.most).then(|| {
         let most = bytes_text(needed.most);

@@ -27,6 +27,8 @@ pub struct Progress {
     watch: Option<Watch>,
     /// What the work is a part of.
     of: Option<String>,
+    /// Work that is measured in samples of pixels, all that are drawn.
+    overall: Option<Arc<Work>>,
 }
 
 impl std::fmt::Debug for Progress {
@@ -48,8 +50,8 @@ pub struct Stage {
 struct Work {
     name: String,
     started: Instant,
-    /// 0 where nobody knows.
-    total: u64,
+    /// 0 while nobody knows.
+    total: AtomicU64,
     done: AtomicU64,
     bar: Mutex<Option<ProgressBar>>,
 }
@@ -57,10 +59,17 @@ struct Work {
 /// All that is being done, drawn from a thread of its own: what takes long before its first tick shows too.
 struct Board {
     started: Instant,
-    running: Mutex<Vec<Arc<Work>>>,
+    running: Mutex<Running>,
     bars: MultiProgress,
     /// When the last line was written; `None` on a terminal, which has bars.
     last_line: Option<Mutex<Instant>>,
+}
+
+#[derive(Default)]
+struct Running {
+    works: Vec<Arc<Work>>,
+    /// Whether the thread is there; where nothing is done, none is awake.
+    is_drawn: bool,
 }
 
 impl Progress {
@@ -68,15 +77,12 @@ impl Progress {
     pub fn new(visible: bool) -> Self {
         let board = visible.then(|| {
             let now = Instant::now();
-            let board = Arc::new(Board {
+            Arc::new(Board {
                 started: now,
                 running: Mutex::default(),
                 bars: MultiProgress::new(),
                 last_line: (!stderr().is_terminal()).then(|| Mutex::new(now)),
-            });
-            let drawn = Arc::downgrade(&board);
-            std::thread::spawn(move || draw(&drawn));
-            board
+            })
         });
         Progress { board, ..Progress::default() }
     }
@@ -91,12 +97,30 @@ impl Progress {
         Progress { of: Some(of.to_owned()), ..self.clone() }
     }
 
+    /// Bars of work that is a part of a stage whose units are samples of pixels: those that are drawn count there too.
+    pub fn overall(&self, stage: &Stage) -> Self {
+        Progress { overall: Some(stage.work.clone()), ..self.clone() }
+    }
+
+    /// Whether samples of pixels count in a stage of the whole.
+    pub fn has_overall(&self) -> bool {
+        self.overall.is_some()
+    }
+
+    /// Counts samples of pixels that were drawn, for the stage of the whole, where there is one; from any thread.
+    pub fn drawn(&self, samples: u64) {
+        if let Some(work) = &self.overall {
+            work.done.fetch_add(samples, Ordering::Relaxed);
+        }
+    }
+
     /// A bar for `total` units of work called `name`, with an estimate of the time that is left; one unit has none.
     pub fn stage(&self, name: impl Into<String>, total: u64) -> Stage {
         self.start(name.into(), if total > 1 { total } else { 0 })
     }
 
-    /// Work of which nobody knows how much there is: its name and the time that it has taken.
+    /// Work of which nobody knows yet how much there is: its name and the time that it has taken, and a bar as soon as
+    /// [`Stage::expect`] has told.
     pub fn busy(&self, name: impl Into<String>) -> Stage {
         self.start(name.into(), 0)
     }
@@ -106,11 +130,21 @@ impl Progress {
             Some(of) => format!("{of}: {name}"),
             None => name,
         };
-        let work =
-            Work { name, started: Instant::now(), total, done: AtomicU64::new(0), bar: Mutex::default() };
+        let work = Work {
+            name,
+            started: Instant::now(),
+            total: total.into(),
+            done: 0.into(),
+            bar: Mutex::default(),
+        };
         let work = Arc::new(work);
         if let Some(board) = &self.board {
-            lock(&board.running).push(work.clone());
+            let mut running = lock(&board.running);
+            running.works.push(work.clone());
+            if !std::mem::replace(&mut running.is_drawn, true) {
+                let board = Arc::downgrade(board);
+                std::thread::spawn(move || draw(&board));
+            }
         }
         Stage { work, board: self.board.clone(), watch: self.watch.clone() }
     }
@@ -125,11 +159,17 @@ impl Progress {
 }
 
 impl Stage {
+    /// Tells of so many units more that are to be done; from any thread.
+    pub fn expect(&self, units: u64) {
+        self.work.total.fetch_add(units, Ordering::Relaxed);
+    }
+
     /// Counts `units` more as done; from any thread.
     pub fn add(&self, units: u64) {
         let done = self.work.done.fetch_add(units, Ordering::Relaxed) + units;
         if let Some(watch) = &self.watch {
-            watch(&self.work.name, done as f32 / self.work.total.max(1) as f32);
+            let total = self.work.total.load(Ordering::Relaxed).max(1);
+            watch(&self.work.name, done as f32 / total as f32);
         }
     }
 }
@@ -138,7 +178,7 @@ impl Drop for Stage {
     fn drop(&mut self) {
         let Some(board) = &self.board else { return };
         let mut running = lock(&board.running);
-        running.retain(|work| !Arc::ptr_eq(work, &self.work));
+        running.works.retain(|work| !Arc::ptr_eq(work, &self.work));
         if let Some(bar) = lock(&self.work.bar).take() {
             bar.finish_and_clear();
             board.bars.remove(&bar);
@@ -149,8 +189,8 @@ impl Drop for Stage {
 impl Work {
     /// How much is done, of 1; `None` where nobody knows.
     fn share(&self) -> Option<f32> {
-        let done = self.done.load(Ordering::Relaxed);
-        (self.total > 0).then(|| (done as f32 / self.total as f32).min(1.0))
+        let [done, total] = [&self.done, &self.total].map(|count| count.load(Ordering::Relaxed));
+        (total > 0).then(|| (done as f32 / total as f32).min(1.0))
     }
 
     /// The time that is left if the rest goes as what is done did; else the time that it has taken.
@@ -171,14 +211,14 @@ impl Work {
 
     fn draw(&self, bars: &MultiProgress) {
         let mut bar = lock(&self.bar);
+        let total = self.total.load(Ordering::Relaxed);
         let bar = bar.get_or_insert_with(|| {
-            let template = match self.total {
-                0 => "{msg:28} {spinner} {prefix}",
-                _ => "{msg:28} {bar:40} {percent:>3} %  {prefix}",
-            };
-            let style = ProgressStyle::with_template(template).expect("the template is well formed");
-            bars.add(ProgressBar::new(self.total.max(1)).with_style(style).with_message(self.name.clone()))
+            bars.add(ProgressBar::new(0).with_style(style(false)).with_message(self.name.clone()))
         });
+        if bar.length() != Some(total) {
+            bar.set_style(style(true));
+            bar.set_length(total);
+        }
         bar.set_prefix(self.time());
         bar.set_position(self.done.load(Ordering::Relaxed));
         bar.tick();
@@ -186,15 +226,17 @@ impl Work {
 }
 
 impl Board {
-    fn draw(&self) {
-        if self.started.elapsed() < PATIENCE {
-            return;
+    /// Draws, and tells whether there was anything to draw.
+    fn draw(&self) -> bool {
+        let mut running = lock(&self.running);
+        running.is_drawn = !running.works.is_empty();
+        if !running.is_drawn || self.started.elapsed() < PATIENCE {
+            return running.is_drawn;
         }
-        let running = lock(&self.running);
-        let shown: Vec<_> = running.iter().filter(|work| work.started.elapsed() > 2 * FRAME).collect();
+        let shown: Vec<_> = running.works.iter().filter(|work| work.started.elapsed() > 2 * FRAME).collect();
         let Some(last_line) = &self.last_line else {
             shown.iter().for_each(|work| work.draw(&self.bars));
-            return;
+            return true;
         };
         let mut last_line = lock(last_line);
         if !shown.is_empty() && last_line.elapsed() >= LINE_STEP {
@@ -202,14 +244,21 @@ impl Board {
             // Nobody is left to tell that standard error is closed.
             let _ = writeln!(stderr(), "{}", line(&shown.iter().map(|work| work.line()).collect::<Vec<_>>()));
         }
+        true
     }
 }
 
-/// Draws until nobody does any work any more.
+fn style(has_share: bool) -> ProgressStyle {
+    let template = match has_share {
+        false => "{msg:28} {spinner} {prefix}",
+        true => "{msg:28} {bar:40} {percent:>3} %  {prefix}",
+    };
+    ProgressStyle::with_template(template).expect("the template is well formed")
+}
+
+/// Draws as long as anything is done.
 fn draw(board: &Weak<Board>) {
-    while let Some(board) = board.upgrade() {
-        board.draw();
-        drop(board);
+    while board.upgrade().is_some_and(|board| board.draw()) {
         std::thread::sleep(FRAME);
     }
 }
@@ -244,9 +293,48 @@ mod tests {
         Work {
             name: "baking lamp".into(),
             started: Instant::now() - Duration::from_secs(8),
-            total,
-            done: AtomicU64::new(done),
+            total: total.into(),
+            done: done.into(),
             bar: Mutex::default(),
+        }
+    }
+
+    #[test]
+    fn work_whose_extent_comes_later_shows_no_share() {
+        let progress = Progress::new(false);
+        let reading = progress.busy("reading lamp");
+        assert_eq!(reading.work.share(), None);
+        reading.expect(30);
+        reading.add(12);
+        reading.expect(10);
+        assert_eq!(reading.work.share(), Some(0.3));
+    }
+
+    #[test]
+    fn samples_of_parts_do_not_count_in_the_whole() {
+        let progress = Progress::new(false);
+        let all = progress.stage("demo", 100);
+        assert!(!progress.has_overall());
+        let part = progress.overall(&all);
+        assert!(part.has_overall());
+        part.of("brocade").drawn(25);
+        progress.drawn(50);
+        assert_eq!(all.work.share(), Some(0.25));
+    }
+
+    #[test]
+    fn nobody_draws_when_work_begins_again() {
+        let progress = Progress::new(true);
+        let is_drawn = || lock(&progress.board.as_ref().unwrap().running).is_drawn;
+        for _ in 0..2 {
+            let stage = progress.stage("baking", 2);
+            assert!(is_drawn());
+            drop(stage);
+            let started = Instant::now();
+            while is_drawn() {
+                assert!(started.elapsed() < Duration::from_secs(30), "the thread stays awake");
+                std::thread::sleep(FRAME);
+            }
         }
     }
 

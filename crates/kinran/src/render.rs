@@ -27,7 +27,7 @@ use crate::{Console, Error, outputs};
 /// a filtered probe, shadows of one directional light by a map.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  kinran render lamp.glb -o lamp.png
+  kinran render lamp.glb
   kinran render lamp.glb -o lamp.exr --size 1920x1080 --spp 256 \\
       --env studio.hdr --env-rotation 90
   kinran render lamp.glb -o far.png --distance 8 --filter naive
@@ -41,9 +41,9 @@ pub struct Args {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
-    /// The picture: .png for displays, .exr for linear radiance
+    /// The picture: .png for displays, .exr for linear radiance [default: NAME.render.png beside the input]
     #[arg(long, short, value_name = "PICTURE")]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
 
     /// What draws: the reference renderer on the CPU, or a GPU by Vulkan
     #[arg(long, value_enum, default_value_t = Backend::Cpu)]
@@ -99,18 +99,16 @@ pub(crate) struct Summary {
 /// One that names the file: input that cannot be read, output that cannot be written, flags that do not fit
 /// the file.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    outputs::check_file(&args.output, &["png", "exr"])?;
-    args.view.refuse_inputs(&args.file, [args.output.clone()])?;
+    let output = args.output.clone().unwrap_or_else(|| outputs::named_after(&args.file, ".render.png"));
+    outputs::check_file(&output, &["png", "exr"])?;
+    args.view.refuse_inputs(&args.file, [output.clone()])?;
     let painter = args.backend.open(args.shaders.as_deref())?;
     let progress = console.progress();
-    let reading = progress.busy(format!("reading {}", file_name(&args.file)));
-    let Model { path, scene, only_baked } = Model::open(&args.file, &args.view.model)?;
+    let Model { path, scene, only_baked } = Model::open(&args.file, &args.view.model, &progress)?;
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
-    drop(reading);
     let own = Mips::of(&scene);
     let mips = args.filter.unwrap_or(own);
-    let refuse =
-        |reason: &str| Err(Error::Usage(format!("{}: --filter {}: {reason}", path.display(), mips.name())));
+    let refuse = |reason: &str| Err(Error::flag_error_of(&path, format!("--filter {}", mips.name()), reason));
     if only_baked && !matches!(mips, Mips::Baked | Mips::Level0) {
         return refuse(
             "a folder of baked textures has no maps to bake; leave --filter out, or name the model",
@@ -134,15 +132,15 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     drop(preparing);
     painter.left_out(&view, &prepared).iter().for_each(|what| console.warn(what));
     let film = painter.film(&view, &prepared, "render", args.spp, filtering, &progress)?;
-    if outputs::has_extension(&args.output, "exr") {
+    if outputs::has_extension(&output, "exr") {
         let pixels = Pixels::F32(film.pixels.into_flattened());
-        write_exr(&args.output, &Image::new(film.width, film.height, Channels::Rgb, pixels)?)?;
+        write_exr(&output, &Image::new(film.width, film.height, Channels::Rgb, pixels)?)?;
     } else {
-        write_rgb8(&args.output, film.width, film.height, view.display(&film))?;
+        write_rgb8(&output, film.width, film.height, view.display(&film))?;
     }
 
     let summary = Summary {
-        output: file_name(&args.output),
+        output: file_name(&output),
         width: film.width,
         height: film.height,
         samples_per_pixel: args.spp,
@@ -152,14 +150,16 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     };
     let text = format!(
         "{}: {}x{}, {} samples a pixel, {} triangles, filter {}",
-        args.output.display(),
+        output.display(),
         summary.width,
         summary.height,
         summary.samples_per_pixel,
         summary.triangles,
         summary.filter
     );
-    console.result(&summary, &text)
+    console.result(&summary, &text)?;
+    outputs::tell_place(console, args.output.as_deref(), &output);
+    Ok(())
 }
 
 /// Triangles in the world, instances counted each.

@@ -163,11 +163,17 @@ fn chosen(language: Language, name: Option<&str>) -> Result<Vec<Module>, Error> 
     let (modules, ..) = language.texts();
     let Some(name) = name else { return Ok(modules.to_vec()) };
     if language == Language::Spirv {
-        return Err(Error::Usage(format!("--module {name}: SPIR-V comes as one module; leave the flag out")));
+        return Err(Error::flag_error(
+            format!("--module {name}"),
+            "SPIR-V comes as one module; leave the flag out",
+        ));
     }
     if !modules.iter().any(|module| module.name == name) {
         let names: Vec<_> = modules.iter().map(|module| module.name).collect();
-        return Err(Error::Usage(format!("--module {name}: choose one of {}", names.join(", "))));
+        return Err(Error::flag_error(
+            format!("--module {name}"),
+            format!("choose one of {}", names.join(", ")),
+        ));
     }
     let mut wanted = vec![name];
     for module in modules.iter().rev() {
@@ -182,15 +188,16 @@ fn chosen(language: Language, name: Option<&str>) -> Result<Vec<Module>, Error> 
 fn text(language: Language, name: Option<&str>, chosen: &[Module]) -> Result<String, Error> {
     match (language, name) {
         (Language::Spirv, _) => {
-            Err(Error::Usage("--lang spirv: is binary; give a folder by --output".into()))
+            Err(Error::flag_error("--lang spirv", "is binary; give a folder by --output"))
         }
         // Imports are WESL's way to say what a module needs.
         (Language::Wesl, Some(name)) => {
             let module = chosen.iter().find(|module| module.name == name);
             Ok(module.map(|module| module.text.to_owned()).unwrap_or_default())
         }
-        (Language::Wesl, None) => Err(Error::Usage(
-            "--lang wesl: modules are files; give a folder by --output, or a --module".into(),
+        (Language::Wesl, None) => Err(Error::flag_error(
+            "--lang wesl",
+            "modules are files; give a folder by --output, or a --module",
         )),
         _ => {
             let names: Vec<_> = chosen.iter().map(|module| module.name).collect();
@@ -219,10 +226,9 @@ fn write(
         std::fs::read(folder.join(name)).is_ok_and(|there| there != *bytes)
     };
     if let Some((name, _)) = files.iter().find(other).filter(|_| !force) {
-        return Err(Error::Usage(format!(
-            "{}: is there with another content; name another folder with --output, or overwrite it with --force",
-            folder.join(name).display()
-        )));
+        let reason =
+            "is there with another content; name another folder with --output, or overwrite it with --force";
+        return Err(Error::file_error(folder.join(name), reason));
     }
     std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
     for (name, bytes) in &files {

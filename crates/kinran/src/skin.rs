@@ -166,7 +166,7 @@ pub(crate) fn tables(skin: &Skin, material: &str, range: f32) -> Result<SkinTabl
     let radial = profile.radial().map_err(|e| Error::Usage(format!("material \"{material}\": {e}")))?;
     let table = skin_table;
     Ok(SkinTables {
-        punctual: table(punctual_table(radial, SIZE.0, SIZE.1, f64::from(range))),
+        punctual: table(punctual_table(radial, SIZE.0, SIZE.1, f64::from(range), &|_| {})),
         ambient: table(ambient_table(radial, SIZE.0, f64::from(range))),
         penumbra: table(penumbra_table(radial, PENUMBRA_SIZE.0, PENUMBRA_SIZE.1, 1.0)),
         range,

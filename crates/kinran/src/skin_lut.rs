@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use kinran_bake::skin_lut::{
-    Profile, Table, TableFormat, ambient_table, penumbra_table, punctual_interpolation_error, punctual_table,
+    INTERPOLATION_GRID, Profile, Table, TableFormat, ambient_table, penumbra_table,
+    punctual_interpolation_error, punctual_table,
 };
 use kinran_image::{Texture, encode_dds, encode_ktx2, write_atomically};
 use kinran_shading::skin::profile::{Gaussian, ProfileError};
@@ -16,7 +17,10 @@ use serde::Serialize;
 
 use crate::bake::Container;
 use crate::content::Content;
-use crate::outputs::{WrittenFile, check_folder, refuse_foreign, refuse_input};
+use crate::outputs::{
+    Space, WrittenFile, beside, check_folder, check_space, refuse_foreign, refuse_input, replaced_bytes,
+    tell_place,
+};
 use crate::values::{number, size};
 use crate::{Console, Error};
 
@@ -43,9 +47,9 @@ A .csv has rows of distance in mm and density for red, green and blue; a .json h
 
 with variances in mm². Both are the radial profile, light per area against the distance from a point.")]
 pub struct Args {
-    /// Where the files go; made if it is not there
+    /// Where the files go; made if it is not there [default: baked, beside --profile if there is one]
     #[arg(long, short, value_name = "DIR")]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
 
     /// What the files' names begin with
     #[arg(long, default_value = "skin")]
@@ -108,6 +112,17 @@ pub enum FormatName {
     Rgba8,
 }
 
+impl Args {
+    /// Where the files go.
+    fn output(&self) -> PathBuf {
+        let nowhere = || self.profile.as_ref().map_or_else(|| "baked".into(), |file| beside(file, "baked"));
+        self.output.clone().unwrap_or_else(nowhere)
+    }
+}
+
+/// Texels along the sides of the table of penumbras, at most; chosen by eye.
+const PENUMBRA: u64 = 64;
+
 fn triple(text: &str) -> Result<[f64; 3], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse::<f64>()).collect();
     match numbers.as_deref() {
@@ -151,21 +166,33 @@ struct TableReport {
     interpolation_error: Option<f32>,
 }
 
+/// Bytes that the tables will take.
+pub(crate) fn space(args: &Args) -> Space {
+    let texel = if args.format == FormatName::Rgba16f { 8 } else { 4 };
+    let (width, height) = (u64::from(args.size.0), u64::from(args.size.1));
+    let penumbra = if args.penumbra { width.min(PENUMBRA) * height.min(PENUMBRA) } else { 0 };
+    let texels = width * height + 2 * width + penumbra;
+    Space::exact(texels * texel * args.container.extensions().len() as u64)
+}
+
 /// Runs the command.
 ///
 /// # Errors
 /// Whatever is wrong with the profile, the flags or the output folder.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if args.name.is_empty() || args.name.contains(['/', '\\']) {
-        return Err(Error::Usage(format!("--name {}: must be the beginning of a file's name", args.name)));
+        return Err(Error::flag_error(
+            format!("--name {}", args.name),
+            "must be the beginning of a file's name",
+        ));
     }
     let (profile, described) = profile(args)?;
-    let refuse = |error: ProfileError| {
-        let place = args.profile.as_ref().map_or_else(String::new, |file| format!("{}: ", file.display()));
-        Error::Usage(format!("{place}{error}"))
+    let refuse = |error: ProfileError| match &args.profile {
+        Some(file) => Error::file_error(file, error.to_string()),
+        None => Error::flag_error(profile_flag(args), error),
     };
     let radial = profile.radial().map_err(refuse)?;
-    check_folder(&args.output)?;
+    check_folder(&args.output())?;
     let mut files: Vec<String> = Vec::new();
     let penumbra = args.penumbra.then_some(Content::SkinPenumbra);
     for content in [Content::SkinPunctual, Content::SkinAmbient].into_iter().chain(penumbra) {
@@ -175,17 +202,23 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let sidecar = format!("{}.kinran.json", args.name);
     let all: Vec<String> = files.iter().chain([&sidecar]).cloned().collect();
     for file in &all {
-        refuse_input(&args.output.join(file), args.profile.as_deref())?;
+        refuse_input(&args.output().join(file), args.profile.as_deref())?;
     }
-    refuse_foreign(&args.output, &all, args.force)?;
-    std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
+    refuse_foreign(&args.output(), &all, args.force)?;
+    let needed = space(args).beyond(replaced_bytes(&args.output(), &all));
+    if let Some(warning) = check_space(&args.output(), needed)? {
+        console.warn(warning);
+    }
+    std::fs::create_dir_all(&args.output()).map_err(|e| kinran_image::Error::io(&args.output(), e))?;
 
-    let busy = console.progress().busy("integrating tables");
     let (width, height) = (args.size.0 as usize, args.size.1 as usize);
     let range = f64::from(args.range);
-    let punctual = punctual_table(radial, width, height, range);
+    let points = width * height * (1 + INTERPOLATION_GRID * INTERPOLATION_GRID);
+    let stage = console.progress().stage("integrating tables", points as u64);
+    let progress = |points| stage.add(points);
+    let punctual = punctual_table(radial, width, height, range, &progress);
     let ambient = ambient_table(radial, width, range);
-    let error = punctual_interpolation_error(radial, &punctual, range);
+    let error = punctual_interpolation_error(radial, &punctual, range, &progress);
 
     let mut report = Report {
         kinran: env!("CARGO_PKG_VERSION"),
@@ -202,20 +235,20 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     add(Content::SkinPunctual, &punctual, "n·u from -1 to 1", "curvature from 0 to range", Some(error))?;
     add(Content::SkinAmbient, &ambient, "mean curvature from 0 to range", "band 1, band 2", None)?;
     if args.penumbra {
-        let table = penumbra_table(radial, 64.min(width), 64.min(height), 1.0);
+        let table = penumbra_table(radial, width.min(PENUMBRA as usize), height.min(PENUMBRA as usize), 1.0);
         let down = "one over the penumbra's width from 0 to 1/mm";
         add(Content::SkinPenumbra, &table, "filtered shadow from 0 to 1", down, None)?;
     }
     let title = format!("{}, {}", args.name, report.profile);
     plot::plot(&title, &punctual, &ambient, args.range)
-        .write(&args.output.join(format!("{}.png", args.name)))?;
+        .write(&args.output().join(format!("{}.png", args.name)))?;
     report.written =
-        files.iter().map(|file| WrittenFile::of(&args.output, file)).collect::<Result<_, _>>()?;
+        files.iter().map(|file| WrittenFile::of(&args.output(), file)).collect::<Result<_, _>>()?;
     let mut text = serde_json::to_string_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
     text.push('\n');
-    write_atomically(&args.output.join(sidecar), text.as_bytes())?;
+    write_atomically(&args.output().join(sidecar), text.as_bytes())?;
 
-    drop(busy);
+    drop(stage);
     let mut lines = String::new();
     for table in &report.tables {
         let between = table
@@ -230,8 +263,19 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             table.encoding_error
         );
     }
-    lines += &format!("{}\n", args.output.join(format!("{}.png", args.name)).display());
-    console.result(&report, &lines)
+    lines += &format!("{}\n", args.output().join(format!("{}.png", args.name)).display());
+    console.result(&report, &lines)?;
+    tell_place(console, args.output.as_deref(), &args.output());
+    Ok(())
+}
+
+/// The flag that decides about a profile that no file gives.
+fn profile_flag(args: &Args) -> &'static str {
+    match (args.burley, args.mean_free_path) {
+        (Some(_), _) => "--burley",
+        (_, Some(_)) => "--mean-free-path",
+        _ => "--scale",
+    }
 }
 
 /// The profile that the flags name, and what it is called.
@@ -293,7 +337,7 @@ fn write_table(
             "dds" => encode_dds(&texture)?,
             _ => encode_ktx2(&texture, None)?,
         };
-        write_atomically(&args.output.join(&file), &bytes)?;
+        write_atomically(&args.output().join(&file), &bytes)?;
         files.push(file);
     }
     Ok(TableReport {

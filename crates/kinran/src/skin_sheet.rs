@@ -11,7 +11,7 @@ use kinran_bake::skin_lut::{Profile, Table, punctual_table};
 use kinran_render::reference::{
     PictureCamera, RenderScene, RenderSkin, SkinCurvature, SurfacePoint, TextureFiltering,
 };
-use kinran_scene::{Light, LightKind, Primitive, Scene, Skin, VertexCurvature, any_tangent};
+use kinran_scene::{Light, LightKind, Needs, Primitive, Scene, Skin, VertexCurvature, any_tangent};
 use kinran_shading::Sym2;
 use kinran_shading::skin::curvature::curvature_decode;
 use kinran_shading::skin::lighting::SKIN_NORMAL_BLUR;
@@ -19,7 +19,10 @@ use kinran_shading::skin::profile::Gaussian;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::bake::curvature::{Blur, Joined, MethodName, deviations, measured, meshes, pose_scale, unit};
+use crate::bake::curvature::{
+    Blur, Joined, MethodName, deviations, measured, meshes, pose_scale, shares, triangles_of, unit,
+};
+use crate::model::read_scene;
 use crate::picture::{Color, INK, PAPER, Picture, Row, grid};
 use crate::skin::{SIZE, profile, skin_table};
 use crate::skin_lut::plot::plot;
@@ -51,9 +54,9 @@ pub struct Args {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
-    /// The folder for the sheets
+    /// The folder for the sheets [default: NAME.skin beside the input]
     #[arg(long, short, value_name = "DIR")]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
 
     /// Draws these sheets; all by default
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAMES")]
@@ -147,17 +150,17 @@ pub(crate) struct Summary {
 /// # Errors
 /// One that names the flag or the file.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    outputs::check_folder(&args.output)?;
+    let output = args.output.clone().unwrap_or_else(|| outputs::named_after(&args.file, ".skin"));
+    outputs::check_folder(&output)?;
     let sheets = if args.sheet.is_empty() { Sheet::value_variants() } else { &args.sheet };
-    let pictures = sheets.iter().map(|&sheet| args.output.join(sheet_file(sheet)));
+    let pictures = sheets.iter().map(|&sheet| output.join(sheet_file(sheet)));
     args.view.refuse_inputs(&args.file, pictures)?;
     if let Some(c) = args.base.filter(|c| c.min_element() < 0.0 || c.max_element() > 1.0) {
-        return Err(Error::Usage(format!("--base {},{},{}: each must lie in 0 to 1", c.x, c.y, c.z)));
+        let given = format!("--base {},{},{}", c.x, c.y, c.z);
+        return Err(Error::flag_error(given, "each must lie in 0 to 1"));
     }
     let progress = console.progress();
-    let reading = progress.busy(format!("reading {}", file_name(&args.file)));
-    let mut scene = Scene::load_allowing(&args.file, args.view.model.allowed()?)?;
-    drop(reading);
+    let mut scene = read_scene(&args.file, &args.view.model, &Needs::ALL, &progress)?;
     let mut warnings = scene.warnings.clone();
     if scene.materials.iter().all(|m| m.skin.is_none()) {
         scene.materials.iter_mut().for_each(|m| m.skin = Some(Skin::default()));
@@ -189,19 +192,20 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     }
     let studio = Studio { args, scene: &scene, prepared, view, progress: &progress };
 
-    std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
+    std::fs::create_dir_all(&output).map_err(|e| kinran_image::Error::io(&output, e))?;
     let all = progress.stage("sheets", sheets.len() as u64);
     let mut files = Vec::new();
     for &sheet in sheets {
         let name = sheet_file(sheet);
-        studio.sheet(sheet)?.write(&args.output.join(&name))?;
+        studio.sheet(sheet)?.write(&output.join(&name))?;
         files.push(name);
         all.add(1);
     }
     drop(all);
-    let text =
-        format!("{} sheets of {} are in {}", files.len(), file_name(&args.file), args.output.display());
-    console.result(&Summary { files, warnings }, &text)
+    let text = format!("{} sheets of {} are in {}", files.len(), file_name(&args.file), output.display());
+    console.result(&Summary { files, warnings }, &text)?;
+    outputs::tell_place(console, args.output.as_deref(), &output);
+    Ok(())
 }
 
 /// What the camera sees at a point of the picture.
@@ -277,10 +281,10 @@ fn bake(
     warnings: &mut Vec<String>,
 ) -> Result<(), Error> {
     let groups = meshes(scene);
-    let stage = progress.stage("curvature", groups.len() as u64);
+    let stage = progress.stage("curvature", triangles_of(scene, groups.iter().flatten()));
     for group in groups {
-        stage.add(1);
         if group.iter().all(|&i| scene.primitives[i].curvature.is_some()) {
+            stage.add(triangles_of(scene, group.iter()));
             continue;
         }
         let name = format!("mesh {}", scene.primitives[group[0]].source.mesh);
@@ -315,8 +319,8 @@ fn bake(
             tangents: Some(&surface.tangents),
             triangles: &surface.triangles,
         };
-        let baked = bake_curvature(&mesh, &options)
-            .map_err(|e| Error::Usage(format!("{}: {name}: {e}", args.file.display())))?;
+        let baked = bake_curvature(&mesh, &options, &shares(&stage, surface.triangles.len()))
+            .map_err(|e| Error::file_error(&args.file, format!("{name}: {e}")))?;
         let remarks = baked.report.remarks();
         if !remarks.is_empty() {
             warnings.push(format!("{name}: {remarks}"));
@@ -447,11 +451,12 @@ impl Studio<'_> {
                 continue;
             };
             let Profile::Gaussians(sum) = profile(skin) else {
-                return Err(Error::Usage(format!(
+                let reason = format!(
                     "material \"{}\": Burley's radial profile diverges on a ring, so there is no wrong picture; leave \
-                     --sheet profiles out",
+                     the sheet out",
                     material.name
-                )));
+                );
+                return Err(Error::flag_error_of(&self.args.file, "--sheet profiles", reason));
             };
             // A Gaussian per area over a line is one per length, its weight divided by the root of 2 π times the variance.
             let divide = |g: &Gaussian| Gaussian { weight: g.weight.map(|w| w / g.variance.sqrt()), ..*g };
@@ -466,7 +471,7 @@ impl Studio<'_> {
                 let radial = wrong.radial().map_err(|e| Error::Internal(e.to_string()))?;
                 let mut tables = (*skin.tables).clone();
                 let range = f64::from(tables.range);
-                tables.punctual = skin_table(punctual_table(radial, SIZE.0, SIZE.1, range));
+                tables.punctual = skin_table(punctual_table(radial, SIZE.0, SIZE.1, range, &|_| {}));
                 skin.tables = Arc::new(tables);
             }
             wrongs.push(self.draw("radial", &swapped, &light)?);
@@ -538,7 +543,9 @@ impl Studio<'_> {
     /// Skin of the first material that is some.
     fn skin(&self) -> Result<&RenderSkin, Error> {
         let skin = self.prepared.materials.iter().find_map(|m| m.skin.as_ref());
-        skin.ok_or_else(|| Error::Usage(format!("{}: no material is skin", self.args.file.display())))
+        skin.ok_or_else(|| {
+            Error::file_error(&self.args.file, "no material is skin; give its meshes a material")
+        })
     }
 
     /// A light that stands so far round the camera's view, degrees to the right, a little above it.

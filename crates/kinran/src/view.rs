@@ -99,7 +99,7 @@ impl ViewArgs {
     /// written again without a question, as renderers do.
     ///
     /// # Errors
-    /// [`Error::Usage`] that names the picture.
+    /// [`Error::File`] that names the picture.
     pub(crate) fn refuse_inputs(
         &self,
         model: &Path,
@@ -245,12 +245,11 @@ impl View {
     /// The view of `scene` that `args` ask for; `file` names the scene in errors.
     ///
     /// # Errors
-    /// [`Error::Usage`] where the scene has no triangles or not that camera, and those of the environment's
-    /// file.
+    /// [`Error::File`] where the scene has no triangles, [`Error::Flag`] where it has not that camera, and those of the
+    /// environment's file.
     pub fn new(scene: &Scene, file: &str, args: &ViewArgs) -> Result<View, Error> {
-        let (framed, middle) = frame(scene, args).ok_or_else(|| {
-            Error::Usage(format!("{file}: no triangles; give a file with a mesh in its scene"))
-        })?;
+        let (framed, middle) = frame(scene, args)
+            .ok_or_else(|| Error::file_error(file, "no triangles; give a file with a mesh in its scene"))?;
         let camera = match args.camera {
             None => framed,
             Some(n) => *scene.cameras.get(n).ok_or_else(|| {
@@ -260,7 +259,8 @@ impl View {
                 } else {
                     format!("choose 0 to {}", count - 1)
                 };
-                Error::Usage(format!("{file}: --camera {n}: the file has {count} cameras; {fix}"))
+                let reason = format!("the file has {count} cameras; {fix}");
+                Error::flag_error_of(file, format!("--camera {n}"), reason)
             })?,
         };
         let environment = environment(&args.env, args.env_rotation)?;
@@ -367,13 +367,24 @@ impl View {
         };
         let tiles = u64::from(self.size.0.div_ceil(16)) * u64::from(self.size.1.div_ceil(16));
         let stage = progress.stage(name, tiles);
-        Ok(render(scene, &self.camera, &settings, &|_, _| stage.add(1))?)
+        let all = samples_of(self.size, samples.count);
+        let film = render(scene, &self.camera, &settings, &|_, _| {
+            stage.add(1);
+            progress.drawn(all / tiles);
+        })?;
+        progress.drawn(all % tiles);
+        Ok(film)
     }
 
     /// A film as a display shows it.
     pub fn display(&self, film: &Film) -> Vec<[u8; 3]> {
         to_srgb8(&film.pixels, self.exposure, self.tonemap)
     }
+}
+
+/// Samples of a picture with so many for each pixel.
+pub(crate) fn samples_of((width, height): (u32, u32), for_each: u32) -> u64 {
+    u64::from(width) * u64::from(height) * u64::from(for_each)
 }
 
 /// The camera that sees all triangles from the direction asked for, as near as they allow, and the middle

@@ -6,6 +6,9 @@ use std::process::Command;
 
 use kinran_image::read_image;
 
+#[path = "commands/shape.rs"]
+mod shape;
+
 const MATERIALS: [&str; 3] = ["brocade", "twill", "brushed_disc"];
 
 /// Every file below `folder` by its path in it.
@@ -26,17 +29,25 @@ fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     files
 }
 
-fn demo(folder: &Path, threads: &str) -> BTreeMap<String, Vec<u8>> {
+fn demo(folder: &Path, threads: &str, json: bool) -> BTreeMap<String, Vec<u8>> {
     let output = Command::new(env!("CARGO_BIN_EXE_kinran"))
         .args(["demo", "--quick", "--threads", threads, "-o"])
         .arg(folder)
+        .args(json.then_some("--json"))
         .output()
         .unwrap();
     let words = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{}: {words}", output.status);
     let said = String::from_utf8(output.stdout).unwrap();
-    let page = folder.join("index.html").display().to_string();
-    assert!(said.contains(&page), "the page's place is not told: {said}");
+    if json {
+        let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+        shape::valid("demo", &summary);
+        assert_eq!(summary["materials"].as_array().map(Vec::len), Some(MATERIALS.len()), "{summary}");
+        assert_eq!(summary["page"], "index.html");
+    } else {
+        let page = folder.join("index.html").display().to_string();
+        assert!(said.contains(&page), "the page's place is not told: {said}");
+    }
     contents(folder)
 }
 
@@ -54,8 +65,8 @@ fn spread(path: &Path) -> (f32, f32) {
 #[test]
 fn everything_is_there_shows_something_and_is_the_same_for_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
-    let first = demo(&folder.path().join("one"), "1");
-    let second = demo(&folder.path().join("two"), "2");
+    let first = demo(&folder.path().join("one"), "1", false);
+    let second = demo(&folder.path().join("two"), "2", true);
     assert!(first.keys().eq(second.keys()), "{:?} and {:?}", first.keys(), second.keys());
     for (name, bytes) in &first {
         assert!(*bytes == second[name], "{name} differs between one and two threads");

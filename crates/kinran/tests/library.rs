@@ -558,15 +558,52 @@ fn wait(what: &str, done: impl Fn() -> bool) {
     }
 }
 
+struct Watching(Child);
+
+impl Drop for Watching {
+    fn drop(&mut self) {
+        self.0.kill().unwrap_or_default();
+        self.0.wait().map(drop).unwrap_or_default();
+    }
+}
+
+/// Threads that wait for the system wake up when something happens, and never else.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_watch_looks_again_and_again() {
+    let library = Library::new(8);
+    library.statuses(&[]);
+    let watching =
+        Watching(library.command(&["--watch"]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    let process = PathBuf::from(format!("/proc/{}", watching.0.id()));
+    let each = |folder: &str| -> Vec<String> {
+        let entries = fs::read_dir(process.join(folder)).unwrap();
+        // What ends meanwhile is no more.
+        entries
+            .filter_map(|entry| Some(entry.ok()?.path()))
+            .filter_map(|p| fs::read_to_string(p).ok())
+            .collect()
+    };
+    wait("a watch", || each("fdinfo").iter().any(|text| text.contains("inotify wd")));
+    let wakes = || -> u64 {
+        let tasks = fs::read_dir(process.join("task")).unwrap();
+        let of_task = |path: PathBuf| {
+            let text = fs::read_to_string(path.join("status")).ok()?;
+            let line = text.lines().find(|line| line.starts_with("voluntary_ctxt_switches"))?;
+            line.split_whitespace().last()?.parse::<u64>().ok()
+        };
+        tasks.filter_map(|task| of_task(task.ok()?.path())).sum()
+    };
+    // Once it has settled, two seconds without a single wake; a look each second would show.
+    wait("rest", || {
+        let before = wakes();
+        std::thread::sleep(Duration::from_secs(2));
+        wakes() == before
+    });
+}
+
 #[test]
 fn a_saved_input_is_not_noticed() {
-    struct Watching(Child);
-    impl Drop for Watching {
-        fn drop(&mut self) {
-            self.0.kill().unwrap_or_default();
-            self.0.wait().map(drop).unwrap_or_default();
-        }
-    }
     let library = Library::new(1);
     library.statuses(&[]);
     let first = library.output();

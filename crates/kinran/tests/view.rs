@@ -18,7 +18,9 @@ use serde_json::Value;
 #[path = "commands/common.rs"]
 #[allow(dead_code, reason = "the tests of the commands use all of it")]
 mod common;
-use common::{square, text};
+#[path = "commands/shape.rs"]
+mod shape;
+use common::{glb, square, text};
 
 /// Of the screen and of the window, which covers it.
 const WIDTH: usize = 800;
@@ -266,8 +268,13 @@ fn a_person_can_drive_the_window() {
     let share = dragged["split_at"].as_f64().unwrap();
     assert!((share - (0.5 + 120.0 / PANEL as f64)).abs() < 0.02, "the line was dragged to {share}");
     assert_eq!(dragged["orbit"], before["orbit"], "dragging the line turned the model");
-    // Above the message in the lower corner, which says what was saved.
-    display.drag("1", (middle - 100, 300), (middle - 40, 270));
+    // In the lower corner, through the message that says what was saved.
+    let in_corner = |screen: &[[u8; 3]]| -> Vec<[u8; 3]> {
+        (HEIGHT - 100..HEIGHT - 80).flat_map(|y| screen[y * WIDTH + 20..y * WIDTH + 80].to_vec()).collect()
+    };
+    let told = window.settle("what was saved", |screen| in_corner(screen) != in_corner(&at_rest));
+    assert_ne!(in_corner(&told), in_corner(&at_rest), "no message stands where the drag begins");
+    display.drag("1", (50, HEIGHT - 90), (110, HEIGHT - 120));
     let turned = window.saved(&parameters);
     for what in ["yaw", "pitch"] {
         assert_ne!(turned["orbit"][what], before["orbit"][what], "{what} did not change");
@@ -351,6 +358,7 @@ fn the_first_picture_is_timed_and_a_window_closes_by_itself() {
             .unwrap();
         assert!(output.status.success(), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));
         let said: Value = serde_json::from_slice(&output.stdout).unwrap();
+        shape::valid("view", &said);
         let seconds = said["first_picture_seconds"].as_f64().unwrap();
         eprintln!("the first picture came {seconds:.2} s after reading");
         assert!(seconds > 0.0, "there was no first picture");
@@ -358,6 +366,58 @@ fn the_first_picture_is_timed_and_a_window_closes_by_itself() {
         assert_eq!((image.width, image.height), (400, 300));
         std::fs::remove_file(&picture).unwrap();
     }
+}
+
+/// Of a model that says more than is drawn: that is told on standard error and in the result, not over the picture.
+#[test]
+fn a_message_stands_over_the_picture_of_a_screenshot() {
+    let Some(display) = Display::start() else { return };
+    let (folder, model) = square();
+    let bytes = glb();
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let mut json: Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
+    let primitives = json["meshes"][0]["primitives"].as_array_mut().unwrap();
+    primitives.push(serde_json::json!({ "attributes": { "POSITION": 0 }, "mode": 0 }));
+    json["buffers"][0]["uri"] = "square.bin".into();
+    std::fs::write(folder.path().join("square.bin"), &bytes[28 + length..]).unwrap();
+    let with_points = folder.path().join("square.gltf");
+    std::fs::write(&with_points, json.to_string()).unwrap();
+    let take = |model: &Path| {
+        let picture = folder.path().join("window.png");
+        let output = Command::new(env!("CARGO_BIN_EXE_kinran"))
+            .args([
+                "--json",
+                "view",
+                "--spp",
+                "4",
+                "--window",
+                "800x500",
+                text(model),
+                "--screenshot",
+                text(&picture),
+            ])
+            .env("DISPLAY", &display.name)
+            .env("WINIT_X11_SCALE_FACTOR", "1")
+            .env_remove("WAYLAND_DISPLAY")
+            .output()
+            .unwrap();
+        let words = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{}: {words}", output.status);
+        let said: Value = serde_json::from_slice(&output.stdout).unwrap();
+        shape::valid("view", &said);
+        let image = read_image(&picture).unwrap();
+        let Pixels::U8(samples) = image.pixels else { panic!("the screenshot has not 8 bits") };
+        // Left of the controls, which name the file.
+        let rows = samples.chunks(3 * image.width as usize).map(|row| row[..3 * (800 - 380)].to_vec());
+        (rows.collect::<Vec<_>>(), said, words)
+    };
+    let (plain, said, _) = take(&model);
+    assert_eq!(said["warnings"], serde_json::json!([]), "{said}");
+    let (picture, said, words) = take(&with_points);
+    let warning = said["warnings"][0].as_str().unwrap_or_default();
+    assert!(warning.contains("points") && words.contains(warning), "{said} {words}");
+    let other = plain.iter().zip(&picture).position(|(a, b)| a != b);
+    assert_eq!(other, None, "row {other:?} of the picture shows something else");
 }
 
 #[test]

@@ -63,13 +63,15 @@ struct Average {
     rate: f64,
 }
 
-/// Blurs tensors in place by the mean of Gaussians of these deviations, in the mesh's unit.
+/// Blurs tensors in place by the mean of Gaussians of these deviations, in the mesh's unit. `progress` is told the share that is
+/// done.
 pub(crate) fn blur(
     surface: &Welded,
     fans: &Fans,
     normals: &[Vec3],
     tensors: &mut [Sym2],
     deviations: &[f64],
+    progress: &dyn Fn(f32),
 ) {
     // Lengths in the unit in which the model is about one large.
     let scale = surface.unit_scale();
@@ -91,10 +93,11 @@ pub(crate) fn blur(
     let mut before = start;
     let mut now = vec![Vec4::ZERO; before.len()];
     average.step(&before, &mut now, &mut sum, series.get(1).copied().unwrap_or(0.0));
-    for &coefficient in &series[2.min(series.len())..] {
+    for (k, &coefficient) in series.iter().enumerate().skip(2) {
         // T(k+1) = 2 Y T(k) - T(k-1), written over T(k-1).
         average.step_over(&now, &mut before, &mut sum, coefficient);
         std::mem::swap(&mut before, &mut now);
+        progress((k + 1) as f32 / series.len() as f32);
     }
     for (tensor, sum) in tensors.iter_mut().zip(sum) {
         *tensor = Sym2 { xx: sum.x + sum.y, xy: sum.z, yy: sum.x - sum.y };

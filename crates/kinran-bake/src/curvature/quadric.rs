@@ -13,6 +13,8 @@
 //! these are fitted exactly. And a neighbour counts by the curvature that its height says, `2 z / r²`, so that the far
 //! ones, of which there are more, do not say it all.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use super::faces::frame;
 use super::surface::{Fans, Welded, others};
 use glam::{DVec3, Vec3};
@@ -51,24 +53,26 @@ const LANES: usize = 8;
 type Lanes = [f64; LANES];
 
 /// Tensors of points as [`face_tensors`](super::faces::face_tensors) gives them, and how many points could not be fitted and
-/// keep the given ones.
+/// keep the given ones. `progress` is told the share that is done.
 pub(crate) fn quadric_tensors(
     surface: &Welded,
     fans: &Fans,
     normals: &[Vec3],
     tensors: &mut [Sym2],
+    progress: &(dyn Fn(f32) + Sync),
 ) -> usize {
-    fit(surface, fans, normals, tensors, |graph, _| graph.shape_operator())
+    fit(surface, fans, normals, tensors, |graph, _| graph.shape_operator(), progress)
 }
 
 /// Normals of the fitted surfaces, whose error falls with the square of the distance between points or faster. Points that
 /// cannot be fitted, and those on creases, keep the given ones.
 pub(crate) fn quadric_normals(surface: &Welded, fans: &Fans, given: &[Vec3]) -> Vec<Vec3> {
     let mut normals = given.to_vec();
-    fit(surface, fans, given, &mut normals, |graph, point| {
+    let of = |graph: Graph, point: usize| {
         let normal = graph.normal(given[point]);
         if normal.dot(given[point]) > SAME_NORMAL { normal } else { given[point] }
-    });
+    };
+    fit(surface, fans, given, &mut normals, of, &|_| {});
     normals
 }
 
@@ -80,13 +84,18 @@ fn fit<T: Send>(
     normals: &[Vec3],
     results: &mut [T],
     of: impl Fn(Graph, usize) -> T + Sync,
+    progress: &(dyn Fn(f32) + Sync),
 ) -> usize {
     let points = surface.positions.len();
     let rings = || Rings { seen: vec![u32::MAX; points], points: Vec::with_capacity(NEIGHBOURS_MAX) };
+    let (count, done) = (results.len().div_ceil(BAND), AtomicUsize::new(0));
     let bands = results.par_chunks_mut(BAND).enumerate();
     let unfitted = bands.map_init(rings, |rings, (band, results)| {
         let first = band * BAND;
-        pulp::Arch::new().dispatch(FitBand { surface, fans, normals, rings, first, results, of: &of })
+        let unfitted =
+            pulp::Arch::new().dispatch(FitBand { surface, fans, normals, rings, first, results, of: &of });
+        progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f32 / count as f32);
+        unfitted
     });
     unfitted.sum()
 }

@@ -1,5 +1,7 @@
 //! Curvature of a glTF file's meshes, as a vertex attribute.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use clap::ValueEnum;
 use glam::{Mat3, Vec3, Vec4};
 use kinran_bake::curvature::{
@@ -15,7 +17,7 @@ use serde_json::{Value, json};
 
 use super::file_stem;
 use crate::values::number;
-use crate::{Console, Error};
+use crate::{Console, Error, Stage};
 
 /// The extension that makes a material skin.
 const SKIN: &str = "KINRAN_materials_skin";
@@ -229,10 +231,8 @@ pub(super) fn mark_skin(
             .collect();
         if chosen.is_empty() {
             let names: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
-            return Err(Error::Usage(format!(
-                "--skin {name}: there is no such material; there are {}",
-                names.join(", ")
-            )));
+            let reason = format!("there is no such material; there are {}", names.join(", "));
+            return Err(Error::flag_error_of(document.path(), format!("--skin {name}"), reason));
         }
         for i in chosen {
             scene.materials[i].skin.get_or_insert_with(Skin::default);
@@ -255,28 +255,24 @@ pub(super) fn check(args: &super::Args, scene: &Scene, document: &Document) -> R
     let mut wanted = largest(scene, &mut Vec::new(), |mesh| mesh_name(document, mesh));
     wanted.retain(|mesh| mesh.iter().any(|&i| flags.wants(scene, &scene.primitives[i])));
     if wanted.is_empty() && (!flags.skin.is_empty() || flags.curvature == Which::All) {
-        return Err(Error::Usage(format!(
-            "{}: no mesh to measure curvature of has triangles; export the mesh with its faces",
-            args.input.display()
-        )));
+        let reason = "no mesh to measure curvature of has triangles; export the mesh with its faces";
+        return Err(Error::file_error(&args.input, reason));
     }
     let mut dumps = Vec::new();
     for mesh in wanted {
         let name = mesh_name(document, scene.primitives[mesh[0]].source.mesh);
         if let Some(flat) = mesh.iter().map(|&i| &scene.primitives[i].source).find(|s| s.lacks_normals) {
-            return Err(Error::Usage(format!(
-                "{}: {name}: primitive {} has no NORMAL, which glTF draws flat, and curvature needs smooth normals; \
-                 export them, or add --estimate-normals",
-                args.input.display(),
+            let reason = format!(
+                "{name}: primitive {} has no NORMAL, which glTF draws flat, and curvature needs smooth normals; export \
+                 them, or add --estimate-normals",
                 flat.primitive
-            )));
+            );
+            return Err(Error::file_error(&args.input, reason));
         }
         let Some(dump) = flags.curvature_dump.map(|format| dump_file(args, &name, format)) else { continue };
         if dumps.iter().any(|known: &String| known.eq_ignore_ascii_case(&dump)) {
-            return Err(Error::Usage(format!(
-                "{}: two meshes would both be written to {dump}; give them names of their own",
-                args.input.display()
-            )));
+            let reason = format!("two meshes would both be written to {dump}; give them names of their own");
+            return Err(Error::file_error(&args.input, reason));
         }
         dumps.push(dump);
     }
@@ -300,11 +296,11 @@ pub(super) fn bake(
     let groups = largest(scene, warnings, |mesh| mesh_name(document, mesh));
     let groups: Vec<Vec<usize>> =
         groups.into_iter().filter(|mesh| mesh.iter().any(|&i| wanted(&scene.primitives[i]))).collect();
-    let stage = console.progress().stage("curvature", groups.len() as u64);
+    let stage = console.progress().stage("curvature", triangles_of(scene, groups.iter().flatten()));
     for mesh in groups {
         let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
         let name = mesh_name(document, group[0].source.mesh);
-        let at_fault = |reason: String| Error::Usage(format!("{}: {name}: {reason}", args.input.display()));
+        let at_fault = |reason: String| Error::file_error(&args.input, format!("{name}: {reason}"));
         let surface = measured(scene, &mesh, &name, warnings);
         let millimetres = flags.unit_mm.map_or_else(|| unit(scene, &mesh, &name, warnings), f64::from);
         let options = Options {
@@ -321,6 +317,7 @@ pub(super) fn bake(
                 triangles: &surface.triangles,
             },
             &options,
+            &shares(&stage, surface.triangles.len()),
         )
         .map_err(|e| at_fault(e.to_string()))?;
         let packed = baked.pack(flags.curvature_range.unwrap_or_else(|| baked.fitting_range()));
@@ -342,7 +339,6 @@ pub(super) fn bake(
             clamped_vertices: packed.clamped,
             found: baked.report,
         });
-        stage.add(1);
     }
     Ok(reports)
 }
@@ -437,6 +433,20 @@ pub(crate) fn stretch(scene: &Scene, mesh: &[usize]) -> Stretch {
         (true, true) => Stretch::None,
         (true, false) if first.is_finite() => Stretch::Same(first),
         _ => Stretch::Different,
+    }
+}
+
+/// Triangles of primitives.
+pub(crate) fn triangles_of<'a>(scene: &Scene, primitives: impl Iterator<Item = &'a usize>) -> u64 {
+    primitives.map(|&i| scene.primitives[i].triangles.len() as u64).sum()
+}
+
+/// Tells a stage, whose units are triangles, what share of a mesh of so many is done.
+pub(crate) fn shares(stage: &Stage, triangles: usize) -> impl Fn(f32) + Sync {
+    let told = AtomicU64::new(0);
+    move |share| {
+        let done = (f64::from(share) * triangles as f64) as u64;
+        stage.add(done.saturating_sub(told.fetch_max(done, Ordering::Relaxed)));
     }
 }
 

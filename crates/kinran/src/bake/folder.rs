@@ -3,16 +3,16 @@
 use kinran_bake::aniso::{Sheet, SheetRequest, bake_surface};
 use kinran_bake::folder::{ASSUMED_ROUGHNESS, LoadedMaterial, MaterialMaps, Role as MapRole, Row, scan};
 use kinran_bake::{bake_plain, pack_channels};
-use kinran_image::{Image, Role, Transfer, full_level_count, image_size, level_size};
+use kinran_image::{Encoding, Image, Role, Texture, Transfer, image_size};
 use rayon::prelude::*;
 
 use super::report::{BakeReport, hash_file};
 use super::{
-    Args, Form, Input, Output, Report, SurfaceReport, file_name, file_stem, role_of, sheet_format,
-    texture_files, texture_space, write_texture,
+    Args, Form, Input, Output, Report, SurfaceReport, file_name, file_stem, mip_texels, role_of,
+    sheet_format, texture_files, texture_space, write_texture,
 };
 use crate::content::Content;
-use crate::outputs::{Space, check_space, has_extension, refuse_foreign};
+use crate::outputs::{Space, check_space, has_extension, refuse_foreign, replaced_bytes};
 use crate::{Console, Error};
 
 /// Bakes a folder and tells what came of it.
@@ -89,8 +89,13 @@ pub fn bake_folder(args: &Args, console: &Console) -> Result<Vec<Report>, Error>
     Ok(reports)
 }
 
-/// Refuses what cannot be baked or written, before the first texture is.
-fn check(args: &Args, console: &Console, materials: &[MaterialMaps]) -> Result<(), Error> {
+/// Bytes that the files of a folder will take, by the headers of its maps alone: a library asks for thousands.
+pub(super) fn space(args: &Args) -> Result<Space, Error> {
+    Ok(planned(args, &scan(&args.input, &args.hints())?.materials).1)
+}
+
+/// The files that will be written, and the bytes that they will take.
+fn planned(args: &Args, materials: &[MaterialMaps]) -> (Vec<String>, Space) {
     let (mut files, mut space) = (Vec::new(), Space::default());
     for maps in materials {
         let color = maps.color.as_deref().and_then(image_size);
@@ -111,17 +116,21 @@ fn check(args: &Args, console: &Console, materials: &[MaterialMaps]) -> Result<(
         }
         files.push(report_file(&maps.name));
     }
+    (files, space)
+}
+
+/// Refuses what cannot be baked or written, before the first texture is.
+fn check(args: &Args, console: &Console, materials: &[MaterialMaps]) -> Result<(), Error> {
+    let (files, space) = planned(args, materials);
     let mut names: Vec<String> = files.iter().map(|file| file.to_lowercase()).collect();
     names.sort_unstable();
     if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Error::Usage(format!(
-            "{}: two materials would both be written to {}; rename the files of one",
-            args.input.display(),
-            pair[0]
-        )));
+        let reason = format!("two materials would both be written to {}; rename the files of one", pair[0]);
+        return Err(Error::file_error(&args.input, reason));
     }
     refuse_foreign(args.output(), &files, args.force)?;
-    if let Some(warning) = check_space(args.output(), space)? {
+    let needed = space.beyond(replaced_bytes(args.output(), &files));
+    if let Some(warning) = check_space(args.output(), needed)? {
         console.warn(warning);
     }
     // A map that is none would be found out after hours of baking the materials before it.
@@ -195,16 +204,17 @@ fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> R
             })
             .collect();
 
-        let texels = (0..full_level_count(size.0, size.1))
-            .map(|level| u64::from(level_size(size.0, level)) * u64::from(level_size(size.1, level)))
-            .sum();
-        let stage = console.progress().stage(format!("{} {name}", args.filter.name()), texels);
+        let stage = console.progress().stage(format!("{} {name}", args.filter.name()), mip_texels(size));
         let baked = bake_surface(maps, args.options(), &requests, &|texels| stage.add(texels))?;
         drop(stage);
-        let _busy = console.progress().busy(format!("writing {name}"));
+        let writing = console.progress().stage(format!("writing {name}"), sheets.len() as u64);
         report.levels = baked.levels;
         let written: Vec<Vec<Output>> = (sheets.par_iter().zip(baked.textures))
-            .map(|(&(_, map), texture)| write_texture(args, &format!("{name}_{}", map.name()), map, texture))
+            .map(|(&(_, map), texture)| {
+                let outputs = write_texture(args, &format!("{name}_{}", map.name()), map, texture);
+                writing.add(1);
+                outputs
+            })
             .collect::<Result<_, Error>>()?;
         report.outputs.extend(written.into_iter().flatten());
     } else if occlusion.is_some() || metallic.is_some() {
@@ -214,17 +224,30 @@ fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> R
         let packed =
             pack_channels(channels, packed_without(args), (o.0.max(m.0), o.1.max(m.1)), args.wrap())?;
         let encoding = args.encoding(Role::Data, args.aniso_format);
-        let texture = bake_plain(&packed, Transfer::Linear, encoding, args.options().kernel, args.wrap())?;
+        let texture = plain(args, console, &format!("orm {name}"), &packed, Transfer::Linear, encoding)?;
         report.outputs.extend(write_texture(args, &format!("{name}_orm"), Content::Orm, texture)?);
     }
 
     if let Some(color) = material.images.iter().find(|map| map.role == MapRole::Color) {
-        let _busy = console.progress().busy(format!("color {name}"));
         let encoding = args.encoding(Role::Color, args.color_format);
-        let texture = bake_plain(&color.image, Transfer::Srgb, encoding, args.options().kernel, args.wrap())?;
+        let texture = plain(args, console, &format!("color {name}"), &color.image, Transfer::Srgb, encoding)?;
         report.outputs.extend(write_texture(args, &format!("{name}_color"), Content::Color, texture)?);
     }
     Ok(report)
+}
+
+/// An image that needs no filter of its own, with a bar called `what`.
+fn plain(
+    args: &Args,
+    console: &Console,
+    what: &str,
+    image: &Image,
+    transfer: Transfer,
+    encoding: Encoding,
+) -> Result<Texture, Error> {
+    let stage = console.progress().stage(what, mip_texels((image.width, image.height)));
+    let kernel = args.options().kernel;
+    Ok(bake_plain(image, transfer, encoding, kernel, args.wrap(), &|texels| stage.add(texels))?)
 }
 
 /// Occlusion, roughness, metalness and alpha of a packed map where there is no map of them: open, as the flag says or is

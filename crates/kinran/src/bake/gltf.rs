@@ -1,5 +1,6 @@
 //! A glTF file: its materials' textures are replaced by baked ones, everything else stays.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use kinran_bake::aniso::{RoughnessMaps, Sheet, SheetRequest, bake_surface};
@@ -7,7 +8,7 @@ use kinran_bake::folder::{Green, GreenGuess, guess_green, odd_lengths};
 use kinran_bake::{MaterialSurface, NoSurface, bake_plain, material_surface};
 use kinran_image::{
     Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Role, Texture, Transfer, decode_image,
-    full_level_count, level_size, write_png,
+    image_size_of, write_png,
 };
 use kinran_scene::{
     Document, FUZZ_EXTENSION, Maps, Material, Needs, Scene, Slot, TextureExtension, TextureRef,
@@ -16,11 +17,14 @@ use serde_json::Value;
 
 use super::report::BakeReport;
 use super::{
-    Args, Form, Input, Output, Report, SurfaceReport, curvature, file_name, file_stem, role_of, sheet_format,
-    texture_files, texture_space, write_texture,
+    Args, Form, Input, Output, Report, SurfaceReport, curvature, file_name, file_stem, mip_texels, role_of,
+    sheet_format, texture_files, texture_space, write_texture,
 };
 use crate::content::Content;
-use crate::outputs::{Space, WrittenFile, changed_files, check_space, refuse_foreign, relative};
+use crate::model::read_scene;
+use crate::outputs::{
+    Space, WrittenFile, changed_files, check_space, refuse_foreign, relative, replaced_bytes,
+};
 use crate::{Console, Error};
 
 /// Bakes a glTF file and tells what came of it.
@@ -46,14 +50,10 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
     let output = args.output().join(file_name(&args.input));
     let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
     if same(&output, &args.input) {
-        return Err(Error::Usage(format!(
-            "{}: the baked model would overwrite it; name another folder with --output",
-            args.input.display()
-        )));
+        let reason = "the baked model would overwrite it; name another folder with --output";
+        return Err(Error::file_error(&args.input, reason));
     }
-    let reading = console.progress().busy(format!("reading {}", file_name(&args.input)));
-    let (_files, scene, mut document) = read(args)?;
-    drop(reading);
+    let (_files, scene, mut document) = read(args, console)?;
     let mut report = Report::new(args);
     let surfaces = surfaces(args, &scene, &document, &mut report);
     let stem = args.input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
@@ -70,9 +70,7 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
     for turned in &plan.turned {
         turn_green(args, &mut document, turned, &mut written)?;
     }
-    let colors = console.progress().busy("colour, emission, occlusion");
-    bake_colors(args, &scene, &mut document, &plan.colors, &mut report)?;
-    drop(colors);
+    bake_colors(args, console, &scene, &mut document, &plan.colors, &mut report)?;
     report.curvature = curvature::bake(args, console, &scene, &mut document, &mut report.warnings)?;
 
     for (i, material) in scene.materials.iter().enumerate().take(document.material_count()) {
@@ -266,6 +264,53 @@ fn planned(scene: &Scene, m: &Material, surface: &MaterialSurface) -> Vec<Planne
     planned
 }
 
+/// Bytes that a model's files will take, by the headers of its images alone: a library asks for thousands.
+pub(super) fn space(args: &Args) -> Result<Space, Error> {
+    let document = Document::open_allowing(&args.input, args.model.allowed()?)?;
+    let image = |material: usize, slot: Slot| document.texture_image(document.texture(material, slot)?);
+    let size = |image: &usize| image_size_of(&document.image_bytes(*image).ok()?);
+    let texture = |sheet: Sheet, size: (u32, u32)| {
+        texture_space(args, args.encoding(role_of(sheet), sheet_format(args, sheet)).format, size)
+    };
+    let mut space = Space::default();
+    // Materials that share their maps share their textures.
+    let (mut surfaces, mut plain) = (BTreeSet::new(), BTreeSet::new());
+    for material in 0..document.material_count() {
+        let maps = SURFACE_SLOTS.map(|slot| image(material, slot));
+        let extensions = document.material(material).get("extensions");
+        let directed = extensions.is_some_and(|e| e.get("KHR_materials_anisotropy").is_some());
+        let is_baked = maps[0].is_some() || (directed && maps.iter().any(Option::is_some));
+        if is_baked
+            && surfaces.insert(maps)
+            && let Some(size) =
+                maps.iter().flatten().filter_map(size).reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)))
+        {
+            let sheets = [
+                (maps[0].is_some(), Sheet::Normal),
+                (true, Sheet::Roughness),
+                (directed, Sheet::KhrAnisotropy),
+                (args.form.is_some_and(Form::aniso), Sheet::Aniso),
+            ];
+            let wanted = sheets.into_iter().filter(|(wanted, _)| *wanted);
+            wanted.for_each(|(_, sheet)| space.add(texture(sheet, size)));
+        }
+        for slot in
+            [Slot::BaseColor, Slot::Emissive, Slot::Occlusion].into_iter().filter(|_| args.all_textures)
+        {
+            // Occlusion beside roughness is packed with it.
+            let image = image(material, slot).filter(|image| maps[2] != Some(*image));
+            if let Some(size) = image.filter(|&image| plain.insert(image)).as_ref().and_then(size) {
+                let role = if slot == Slot::Occlusion { Role::Data } else { Role::Color };
+                space.add(texture_space(args, args.encoding(role, args.color_format).format, size));
+            }
+        }
+    }
+    // The model takes along what it had.
+    let files = document.files().into_iter().chain([args.input.clone()]);
+    space.most += files.filter_map(|file| Some(std::fs::metadata(file).ok()?.len())).sum::<u64>();
+    Ok(space)
+}
+
 /// Refuses what cannot be baked or written, before the first texture is; gives the files of curvature's dumps.
 fn check(
     args: &Args,
@@ -311,7 +356,8 @@ fn check(
     files.extend(changed_files(args.output(), &packed));
     files.push(format!("{stem}.kinran.json"));
     refuse_foreign(args.output(), &files, args.force)?;
-    if let Some(warning) = check_space(args.output(), space)? {
+    let needed = space.beyond(replaced_bytes(args.output(), &files));
+    if let Some(warning) = check_space(args.output(), needed)? {
         console.warn(warning);
     }
     Ok(dumps)
@@ -319,7 +365,7 @@ fn check(
 
 /// The model as it is baked: its skin marked, its normals estimated where that was asked for. The document reads the
 /// files of the folder that comes with it when it needs them.
-fn read(args: &Args) -> Result<(Option<tempfile::TempDir>, Scene, Document), Error> {
+fn read(args: &Args, console: &Console) -> Result<(Option<tempfile::TempDir>, Scene, Document), Error> {
     let smoothed = curvature::with_normals(args)?;
     let input =
         smoothed.as_ref().map_or_else(|| args.input.clone(), |f| f.path().join(file_name(&args.input)));
@@ -330,7 +376,7 @@ fn read(args: &Args) -> Result<(Option<tempfile::TempDir>, Scene, Document), Err
         rest_pose: true,
         maps: if args.all_textures { Maps::Plain } else { Maps::Surface },
     };
-    let mut scene = Scene::load_part(&input, allowed, &needs)?;
+    let mut scene = read_scene(&input, &args.model, &needs, &console.progress())?;
     if needs.geometry && document.decompress()? {
         scene.warnings.push(
             "its meshes were compressed by Draco or meshopt; they are written plain, since curvature is added to them"
@@ -521,13 +567,12 @@ impl SurfaceBaker<'_> {
             });
         }
 
-        let texels = (0..full_level_count(size.0, size.1))
-            .map(|level| u64::from(level_size(size.0, level)) * u64::from(level_size(size.1, level)))
-            .sum();
+        let texels = mip_texels(size);
         let stage = self.console.progress().stage(format!("{} {}", args.filter.name(), m.name), texels);
         let baked = bake_surface(maps, args.options(), &requests, &|texels| stage.add(texels))?;
         drop(stage);
-        let _busy = self.console.progress().busy(format!("writing {}", m.name));
+        let writing =
+            self.console.progress().stage(format!("writing {}", m.name), baked.textures.len() as u64);
 
         let mut report = SurfaceReport {
             name: m.name.clone(),
@@ -540,7 +585,9 @@ impl SurfaceBaker<'_> {
         let mut fallback = textures.split_off(planned.len()).into_iter();
         for (planned, texture) in planned.iter().zip(textures) {
             let image = if planned.changed { fallback.next() } else { None };
+            let written = 1 + u64::from(image.is_some());
             report.outputs.extend(self.place(planned, texture, image, materials)?);
+            writing.add(written);
         }
         if let Some(aniso) = aniso {
             let outputs = write_texture(args, &format!("{}_aniso", self.name), Content::Aniso, aniso)?;
@@ -697,10 +744,9 @@ fn refuse_authored(document: &Document, path: &Path) -> Result<(), Error> {
     let images = document.json().get("images").and_then(Value::as_array).into_iter().flatten();
     let authored = images.filter_map(|image| folder.join(image.get("uri")?.as_str()?).canonicalize().ok());
     if authored.into_iter().any(|image| image == existing) {
-        return Err(Error::Usage(format!(
-            "{}: is a map of the model that is baked and would be overwritten; name another folder with --output",
-            path.display()
-        )));
+        let reason =
+            "is a map of the model that is baked and would be overwritten; name another folder with --output";
+        return Err(Error::file_error(path, reason));
     }
     Ok(())
 }
@@ -715,16 +761,23 @@ fn image_of(texture: &Texture) -> Result<Image, Error> {
 /// Bakes the textures that need no filter of their own: base colour, emission, occlusion.
 fn bake_colors(
     args: &Args,
+    console: &Console,
     scene: &Scene,
     document: &mut Document,
     colors: &[Colored],
     report: &mut Report,
 ) -> Result<(), Error> {
+    let image = |color: &Colored| scene.images[color.place.image].as_ref();
+    let texels = colors.iter().filter_map(image).map(|image| mip_texels((image.width, image.height)));
+    let stage = console.progress().stage("colour, emission, occlusion", texels.sum());
     for color in colors {
         let (place, content) = (&color.place, color.content());
         let Some(image) = &scene.images[place.image] else { continue };
         let kernel = args.options().kernel;
-        let texture = bake_plain(image, color.transfer, color.encoding(args), kernel, place.wrap)?;
+        let texture =
+            bake_plain(image, color.transfer, color.encoding(args), kernel, place.wrap, &|texels| {
+                stage.add(texels)
+            })?;
         let outputs = write_texture(args, &color.name, content, texture)?;
         let (material, slot) = color.slots[0];
         let old = document.texture(material, slot);
@@ -746,9 +799,7 @@ fn bake_colors(
 
 /// Says which materials would be baked from what.
 pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
-    let reading = console.progress().busy(format!("reading {}", file_name(&args.input)));
-    let (_files, scene, document) = read(args)?;
-    drop(reading);
+    let (_files, scene, document) = read(args, console)?;
     let mut report = Report::new(args);
     let mut text = String::new();
     for (_, materials, surface) in &surfaces(args, &scene, &document, &mut report) {

@@ -23,11 +23,12 @@ use serde::{Deserialize, Serialize};
 use self::inputs::{Snapshot, Sources};
 use self::ours::Ours;
 use super::settings::{self, Flags};
-use super::{Args, Report, bake_folder, bake_gltf, file_name};
-use crate::detail::{SolveArgs, solve_target};
+use super::{Args, Report, bake_folder, bake_gltf, file_name, folder, gltf};
+use crate::detail::{self, SolveArgs, solve_target};
+use crate::outputs::{Space, check_space};
 use crate::skin_lut;
 use crate::table::list;
-use crate::{Console, Error, Progress};
+use crate::{Console, Error, Failure, Progress};
 
 /// Bytes that a cache may hold where nothing says otherwise; chosen by eye: a few hundred 4096² materials.
 pub const CACHE_LIMIT: u64 = 20 << 30;
@@ -110,11 +111,11 @@ pub struct EntryReport {
     /// What was assumed or left out while it was baked.
     pub warnings: Vec<String>,
     /// Why it failed.
-    pub error: Option<String>,
+    pub error: Option<Failure>,
 }
 
 /// What a run over a manifest did.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, JsonSchema)]
 pub struct LibraryReport {
     /// Where the files are.
     pub output: PathBuf,
@@ -126,6 +127,9 @@ pub struct LibraryReport {
     pub left_over: Vec<PathBuf>,
     /// Those that `--prune` removed, or with `--dry-run` would remove.
     pub pruned: Vec<PathBuf>,
+    /// Bytes that the files of entries that were not up to date take beyond those that they replace, as it is known before
+    /// they are baked.
+    pub space: Space,
     /// What is wrong beside the entries: with the cache, or with room on the disk.
     pub warnings: Vec<String>,
 }
@@ -163,6 +167,9 @@ impl LibraryReport {
             .map(|status| format!("{} {}", self.count(status), status.name()))
             .collect();
         text += &format!("{}; in {}\n", counts.join(", "), self.output.display());
+        if self.entries.iter().any(planned) {
+            text += &format!("the files will take {}\n", self.space.text());
+        }
         let named = |folders: &[PathBuf]| {
             let names: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
             names.join(", ")
@@ -218,7 +225,7 @@ pub fn bake_library(args: &Args, console: &Console) -> Result<(), Error> {
 }
 
 /// Entries that cannot be baked as they are now, by folder: their keys, where they have one, and why.
-type Failures = BTreeMap<PathBuf, (Option<Key>, String)>;
+type Failures = BTreeMap<PathBuf, (Option<Key>, Failure)>;
 
 struct Built {
     report: LibraryReport,
@@ -283,7 +290,7 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
     let mut todo: Vec<(usize, Key, Job, Flags)> = Vec::new();
     for ((at, job, flags), key) in work.into_iter().zip(keys) {
         match key {
-            Err(error) => entries[at].fail(error.to_string()),
+            Err(error) => entries[at].fail(Failure::of(&error)),
             Ok(key) => match library.standing_files(&job, &key) {
                 Some(files) => (entries[at].files, entries[at].status) = (files, Status::UpToDate),
                 None => match failures.get(&job.folder) {
@@ -293,6 +300,7 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
             },
         }
     }
+    let space = library.space(&todo);
     if args.dry_run {
         for (at, key, ..) in &todo {
             let cached = library.cache.as_ref().is_some_and(|cache| cache.get(key).is_some());
@@ -300,8 +308,10 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
         }
         let gone = library.gone(&entries);
         let (left_over, pruned) = if args.library.prune { (Vec::new(), gone) } else { (gone, Vec::new()) };
-        return Ok(library.built(entries, 0, left_over, pruned, Vec::new()));
+        let report = LibraryReport { entries, left_over, pruned, space, ..LibraryReport::default() };
+        return Ok(library.built(report, Vec::new()));
     }
+    let tight = check_space(&library.output, space)?;
     if !todo.is_empty() {
         library.prepare_cache();
     }
@@ -320,7 +330,7 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
                     let (mut entry, mut key) = (EntryReport::new(job), *key);
                     match library.make(job, &mut key, flags, &bars, &mut entry) {
                         Ok(status) => entry.status = status,
-                        Err(error) => entry.fail(error.to_string()),
+                        Err(error) => entry.fail(Failure::of(&error)),
                     }
                     lock(&done).push((*at, entry, key));
                     stage.add(1);
@@ -346,14 +356,17 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
     let mut failed = Vec::new();
     for entry in &entries {
         let Some(error) = &entry.error else { continue };
-        if failures.get(&entry.folder).is_none_or(|(_, why)| why != error) {
-            failed.push(format!("{}: {error}", entry.name));
+        if failures.get(&entry.folder).is_none_or(|(_, why)| why.message != error.message) {
+            failed.push(format!("{}: {}", entry.name, error.message));
         }
         // Without a key it is looked at again and again, until it has one.
         let key = keys.get(&entry.folder).or_else(|| failures.get(&entry.folder)?.0.as_ref()).copied();
         failures.insert(entry.folder.clone(), (key, error.clone()));
     }
-    Ok(library.built(entries, evicted, left_over, pruned, failed))
+    let warnings = tight.into_iter().collect();
+    let report =
+        LibraryReport { entries, evicted, left_over, pruned, space, warnings, ..LibraryReport::default() };
+    Ok(library.built(report, failed))
 }
 
 impl EntryReport {
@@ -379,11 +392,19 @@ impl EntryReport {
             status: Status::Failed,
             files: Vec::new(),
             warnings: Vec::new(),
-            error: Some(error.message.clone()),
+            error: Some(Failure {
+                code: "manifest",
+                message: error.message.clone(),
+                file: Some(error.path.clone()),
+                flag: None,
+                line: Some(error.line),
+                column: Some(error.column),
+                exit_code: 2,
+            }),
         }
     }
 
-    fn fail(&mut self, error: String) {
+    fn fail(&mut self, error: Failure) {
         self.status = Status::Failed;
         self.error = Some(error);
     }
@@ -437,17 +458,10 @@ impl Library {
         self.output.join(STATE)
     }
 
-    fn built(
-        self,
-        entries: Vec<EntryReport>,
-        evicted: usize,
-        left_over: Vec<PathBuf>,
-        pruned: Vec<PathBuf>,
-        failed: Vec<String>,
-    ) -> Built {
-        let warnings = self.trouble.into_inner().into_iter().collect();
-        let output = self.output;
-        let report = LibraryReport { output, entries, evicted, left_over, pruned, warnings };
+    /// What a run over it did: the report but for what is known here.
+    fn built(self, mut report: LibraryReport, failed: Vec<String>) -> Built {
+        report.warnings.extend(self.trouble.into_inner());
+        report.output = self.output;
         let folders = self.folders.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
         Built { report, failed, folders }
     }
@@ -504,6 +518,32 @@ impl Library {
                 0
             }
         }
+    }
+
+    /// Bytes that the files of entries will take beyond those that they replace; of an entry that cannot be read nothing,
+    /// since its error is told when its turn comes.
+    fn space(&self, todo: &[(usize, Key, Job, Flags)]) -> Space {
+        let of_entry = |(_, key, job, flags): &(usize, Key, Job, Flags)| {
+            let cached = self.cache.as_ref().and_then(|cache| cache.get(key));
+            let input = || job.input.clone();
+            let needed = match (cached, flags) {
+                (Some(entry), _) => Space::exact(entry.files.iter().map(|file| file.bytes).sum()),
+                (None, Flags::Bake(flags)) => {
+                    let args = Args { input: input(), ..(**flags).clone() };
+                    let space = if job.kind == Kind::Mesh { gltf::space } else { folder::space };
+                    space(&args).unwrap_or_default()
+                }
+                (None, Flags::Detail(flags)) => {
+                    detail::space(&SolveArgs { target: input(), ..(**flags).clone() })
+                }
+                (None, Flags::Skin(flags)) => skin_lut::space(flags),
+            };
+            let standing = lock(&self.standing).get(&job.folder).cloned().unwrap_or_default();
+            needed.beyond(standing.files.iter().map(|(file, _)| file.bytes).sum())
+        };
+        let mut all = Space::default();
+        todo.par_iter().map(of_entry).collect::<Vec<_>>().into_iter().for_each(|space| all.add(space));
+        all
     }
 
     /// The files of an entry, if they stand in the output as they were written.
@@ -714,14 +754,16 @@ fn bake_into(output: &Path, job: &Job, snapshot: &Snapshot, bars: &Progress) -> 
             }
         }
         Flags::Detail(flags) => {
-            let flags = SolveArgs { target: input, output, ..(**flags).clone() };
+            let flags = SolveArgs { target: input, output: Some(output), ..(**flags).clone() };
             solve_target(&flags, &silent).map(|_| Vec::new())
         }
         Flags::Skin(flags) => {
-            skin_lut::run(&skin_lut::Args { output, ..(**flags).clone() }, &silent).map(|()| Vec::new())
+            skin_lut::run(&skin_lut::Args { output: Some(output), ..(**flags).clone() }, &silent)
+                .map(|()| Vec::new())
         }
     };
-    let reports: Vec<Report> = reports.map_err(|e| snapshot.as_about_originals(e))?;
+    let reports: Vec<Report> =
+        reports.map_err(|e| snapshot.as_about_originals(e.about(&snapshot.job.input)))?;
     let warnings = reports.iter().flat_map(|report| &report.warnings);
     Ok(warnings.map(|warning| snapshot.original_names(warning)).collect())
 }
@@ -761,10 +803,8 @@ fn refuse_input(job: &Job, path: &Path) -> Result<(), Error> {
     };
     let home = beside.and_then(|folder| folder.canonicalize().ok());
     if home.is_some_and(|home| existing.parent() == Some(&home)) {
-        return Err(Error::Usage(format!(
-            "{}: lies among the inputs and would be overwritten; choose another `output`",
-            path.display()
-        )));
+        let reason = "lies among the inputs and would be overwritten; choose another `output`";
+        return Err(Error::file_error(path, reason));
     }
     Ok(())
 }

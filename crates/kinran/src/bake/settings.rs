@@ -89,12 +89,11 @@ pub(super) fn refuse_others(args: &Args) -> Result<(), Error> {
     let of_entries = super::flags::FLAGS.iter().find(|flag| flag.is_of_entries() && (flag.given)(args));
     match of_entries {
         None => Ok(()),
-        Some(flag) => Err(Error::Usage(format!(
-            "{}: --{} says how entries are baked, which stands in the manifest; move these flags to its [defaults], \
-             without their dashes",
-            args.input.display(),
-            flag.name
-        ))),
+        Some(flag) => {
+            let reason = "says how entries are baked, which stands in the manifest; move these flags to its [defaults], \
+                          without their dashes";
+            Err(Error::flag_error_of(&args.input, format!("--{}", flag.name), reason))
+        }
     }
 }
 

@@ -21,7 +21,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{BlockFormat, KindName, page};
-use crate::outputs::{check_folder, refuse_other_page};
+use crate::outputs::{check_folder, named_after, refuse_other_page, tell_place};
 use crate::table::table;
 use crate::{Console, Error};
 
@@ -44,9 +44,9 @@ pub struct LibraryArgs {
     #[arg(value_name = "FOLDER")]
     pub folder: PathBuf,
 
-    /// Where the report goes; made if it is not there
+    /// Where the report goes; made if it is not there [default: NAME.report beside the folder]
     #[arg(long, short, value_name = "DIR")]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
 
     /// Formats of colour, packed data and aniso maps; may be given again [default: bc1 and bc7]. Normals are BC5, grey
     /// maps BC4
@@ -75,6 +75,11 @@ pub struct LibraryArgs {
 }
 
 impl LibraryArgs {
+    /// Where the report goes.
+    fn output(&self) -> PathBuf {
+        self.output.clone().unwrap_or_else(|| named_after(&self.folder, ".report"))
+    }
+
     fn wants(&self, kind: MapKind) -> bool {
         self.kind.is_empty() || self.kind.iter().any(|&name| MapKind::from(name) == kind)
     }
@@ -194,10 +199,13 @@ pub struct LibraryReport {
 }
 
 pub(super) fn run(args: &LibraryArgs, console: &Console) -> Result<(), Error> {
-    check_folder(&args.output)?;
-    refuse_other_page(&args.output.join("index.html"))?;
+    let output = args.output();
+    check_folder(&output)?;
+    refuse_other_page(&output.join("index.html"))?;
     let report = report_library(args, console)?;
-    console.result(&report, &text(&report))
+    console.result(&report, &text(&report))?;
+    tell_place(console, args.output.as_deref(), &output);
+    Ok(())
 }
 
 /// Paints, solves, measures and writes the report.
@@ -208,8 +216,9 @@ pub fn report_library(args: &LibraryArgs, console: &Console) -> Result<LibraryRe
     let materials = read_materials(args, console)?;
     let formats =
         if args.format.is_empty() { vec![BlockFormat::Bc1, BlockFormat::Bc7] } else { args.format.clone() };
-    let pictures = args.output.join("pictures");
-    let folder = if args.no_pictures { &args.output } else { &pictures };
+    let output = args.output();
+    let pictures = output.join("pictures");
+    let folder = if args.no_pictures { &output } else { &pictures };
     std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
     let of_map = |map: &MapFile| formats_of(map, &formats).len() as u64 * texels(args, map);
     let targets = materials.iter().flat_map(|m| m.maps.iter().filter(|map| map.is_target(args)));
@@ -233,8 +242,8 @@ pub fn report_library(args: &LibraryArgs, console: &Console) -> Result<LibraryRe
     drop(stage);
     report.means = means(&report.rows);
     let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
-    write_atomically(&args.output.join("report.json"), &json)?;
-    write_atomically(&args.output.join("index.html"), page::page(&report, !args.no_pictures).as_bytes())?;
+    write_atomically(&output.join("report.json"), &json)?;
+    write_atomically(&output.join("index.html"), page::page(&report, !args.no_pictures).as_bytes())?;
     Ok(report)
 }
 
@@ -454,11 +463,11 @@ fn read_materials(args: &LibraryArgs, console: &Console) -> Result<Vec<Material>
     drop(stage);
     let materials: Vec<Material> = materials.into_iter().flatten().collect();
     if materials.is_empty() {
-        return Err(Error::Usage(format!(
-            "{}: there is no folder with maps in it; give a folder of folders with maps named as color, normal, \
-             roughness, ao or metallic",
-            args.folder.display()
-        )));
+        return Err(Error::file_error(
+            &args.folder,
+            "there is no folder with maps in it; give a folder of folders with maps named as color, normal, roughness, \
+             ao or metallic",
+        ));
     }
     Ok(materials)
 }

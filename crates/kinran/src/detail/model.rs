@@ -31,10 +31,11 @@ pub(super) fn check(args: &SolveArgs) -> Result<Option<Packed>, Error> {
     let Some(model) = &args.model else { return Ok(None) };
     let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
     if same(&output(args, model), model) {
-        return Err(Error::Usage(format!(
-            "--model {}: would be overwritten; name another folder with --output",
-            model.display()
-        )));
+        return Err(Error::flag_error_of(
+            model,
+            "--model",
+            "would be overwritten; name another folder with --output",
+        ));
     }
     let document = Document::open_allowing(model, args.trust.allowed()?)?;
     find_material(&document, args)?;
@@ -65,7 +66,7 @@ pub(super) fn write(
         None => {
             let size = (target.levels[0].width, target.levels[0].height);
             let board = board(stem, MapKind::from(args.kind), size);
-            (Document::from_bytes(Path::new("board.glb"), &board)?, args.output.join(format!("{stem}.glb")))
+            (Document::from_bytes(Path::new("board.glb"), &board)?, args.output().join(format!("{stem}.glb")))
         }
     };
     let material = find_material(&document, args)?;
@@ -73,7 +74,7 @@ pub(super) fn write(
     let (map, slots) = place(args, target);
     if !slots.is_empty() {
         let file = format!("{stem}_authored.png");
-        write_atomically(&args.output.join(&file), &encode_png(&target.image()?)?)?;
+        write_atomically(&args.output().join(&file), &encode_png(&target.image()?)?)?;
         let image = document.add_image_file(&file);
         for &slot in &slots {
             let like = document.texture(material, slot);
@@ -93,12 +94,12 @@ pub(super) fn write(
     }
     let packed = document.pack(&path)?;
     packed.write()?;
-    files.extend(packed.files.iter().map(|(path, _)| relative(&args.output, path)));
+    files.extend(packed.files.iter().map(|(path, _)| relative(&args.output(), path)));
     Ok(files)
 }
 
 fn output(args: &SolveArgs, model: &Path) -> PathBuf {
-    args.output.join(model.file_name().unwrap_or_default())
+    args.output().join(model.file_name().unwrap_or_default())
 }
 
 /// The map that is blended, and the slots that hold the target for those who do not blend.
@@ -205,18 +206,22 @@ fn find_material(document: &Document, args: &SolveArgs) -> Result<usize, Error> 
             None => format!("material {i}"),
         })
         .collect();
-    let complain = |what: String| {
-        let model = document.path().display();
-        Err(Error::Usage(format!("{model}: {what}; its materials: {}", values::list(&names))))
-    };
+    let path = document.path();
+    let list = values::list(&names);
     match &args.material {
-        Some(wanted) => match names.iter().position(|name| name == wanted) {
-            Some(material) => Ok(material),
-            None => complain(format!("--material {wanted}: there is none of that name")),
-        },
+        Some(wanted) => names.iter().position(|name| name == wanted).ok_or_else(|| {
+            let reason = format!("there is none of that name; its materials: {list}");
+            Error::flag_error_of(path, format!("--material {wanted}"), reason)
+        }),
         None if count == 1 => Ok(0),
-        None if count == 0 => complain("it has no material to put the maps into".into()),
-        None => complain("it has several materials; say which with --material".into()),
+        None if count == 0 => Err(Error::file_error(
+            path,
+            "it has no material to put the maps into; give it one, or write a --board",
+        )),
+        None => {
+            let reason = format!("it has several materials; say which with it: {list}");
+            Err(Error::flag_error_of(path, "--material", reason))
+        }
     }
 }
 

@@ -8,7 +8,9 @@ use kinran_bake::detail::{
     Comparison, DetailOptions, FADE_TRIALS, Layer, LayerTransform, LevelError, MapKind, Mask, Resolution,
     Solved, Target, Tile, TileOptions, bearable_opacity, compare, level_pictures, lowest_resolution, solve,
 };
-use kinran_image::{Image, encode_dds, encode_ktx2, encode_png, read_image, read_texture, write_atomically};
+use kinran_image::{
+    Image, encode_dds, encode_ktx2, encode_png, image_size, read_image, read_texture, write_atomically,
+};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -18,7 +20,10 @@ use super::{BlockFormat, KindName, LayerFlag, default_format};
 use crate::bake::{Container, PresetName};
 use crate::content::Content;
 use crate::model::ModelArgs;
-use crate::outputs::{WrittenFile, changed_files, check_folder, has_extension, refuse_foreign, refuse_input};
+use crate::outputs::{
+    Space, WrittenFile, beside, changed_files, check_folder, check_space, has_extension, refuse_foreign,
+    refuse_input, replaced_bytes, tell_place,
+};
 use crate::table::table;
 use crate::values::number;
 use crate::{Console, Error};
@@ -54,9 +59,9 @@ pub struct SolveArgs {
     #[arg(long, value_name = "LAYER", required = true, value_parser = layer_flag)]
     pub layer: Vec<LayerFlag>,
 
-    /// Where the files go; made if it is not there
+    /// Where the files go; made if it is not there [default: baked beside the target]
     #[arg(long, short, value_name = "DIR")]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
 
     /// What the target and its tiles hold
     #[arg(long, value_enum, default_value_t)]
@@ -155,6 +160,13 @@ pub struct SolveArgs {
     pub zstd: i32,
 }
 
+impl SolveArgs {
+    /// Where the files go.
+    pub(super) fn output(&self) -> PathBuf {
+        self.output.clone().unwrap_or_else(|| beside(&self.target, "baked"))
+    }
+}
+
 /// What was solved and how well.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SolveReport {
@@ -182,9 +194,11 @@ pub struct SolveReport {
 }
 
 pub(super) fn run(args: &SolveArgs, console: &Console) -> Result<(), Error> {
-    check_folder(&args.output)?;
+    check_folder(&args.output())?;
     let report = solve_target(args, console)?;
-    console.result(&report, &text(&report))
+    console.result(&report, &text(&report))?;
+    tell_place(console, args.output.as_deref(), &args.output());
+    Ok(())
 }
 
 /// A tile or mask: its file, whether its green grows downwards, and whether it is a mask.
@@ -193,15 +207,42 @@ type TileKey = (PathBuf, bool, bool);
 /// Tiles and masks, each read and compressed once.
 type Tiles = BTreeMap<TileKey, Tile>;
 
+fn tile_keys(args: &SolveArgs) -> BTreeSet<TileKey> {
+    let keys = args.layer.iter().flat_map(|flag| {
+        let mask = flag.mask.iter().map(|mask| (mask.clone(), false, true));
+        mask.chain([(flag.tile.clone(), flag.y_down, false)])
+    });
+    keys.collect()
+}
+
+/// Bytes that the files will take, by the headers of the images alone.
+pub(crate) fn space(args: &SolveArgs) -> Space {
+    let format = args.format.unwrap_or_else(|| default_format(args.kind.into()));
+    let texture = |format: BlockFormat, file: &Path| {
+        let size = image_size(file)?;
+        Some(Space::of_texture(args.container, args.zstd, format.encoding().format, size))
+    };
+    let mut space = texture(format, &args.target).unwrap_or_default();
+    if args.max_error.is_some() {
+        // Any lower resolution may do.
+        space.least = 0;
+    }
+    for key in tile_keys(args).iter().filter(|key| writes_tile(args, key)) {
+        let format = if key.2 { BlockFormat::Bc7 } else { args.tile_format.unwrap_or(format) };
+        space.add(texture(format, &key.0).unwrap_or_default());
+    }
+    let pictures = if args.pictures { PICTURES.len() as u64 } else { 0 };
+    let authored = u64::from(args.board || args.model.is_some());
+    // What PNG does not shrink.
+    let plain = image_size(&args.target).map_or(0, |(w, h)| 3 * u64::from(w) * u64::from(h));
+    space.most += (pictures + authored) * plain;
+    space
+}
+
 /// Refuses what cannot be written, before anything is read.
-fn check(args: &SolveArgs) -> Result<(), Error> {
+fn check(args: &SolveArgs, console: &Console) -> Result<(), Error> {
     let packed = model::check(args)?;
-    let keys: BTreeSet<TileKey> = (args.layer.iter())
-        .flat_map(|flag| {
-            let mask = flag.mask.iter().map(|mask| (mask.clone(), false, true));
-            mask.chain([(flag.tile.clone(), flag.y_down, false)])
-        })
-        .collect();
+    let keys = tile_keys(args);
     let stem = file_stem(&args.target);
     let mut files = texture_files(args, &format!("{stem}_synthesized"));
     for key in keys.iter().filter(|key| writes_tile(args, key)) {
@@ -213,16 +254,21 @@ fn check(args: &SolveArgs) -> Result<(), Error> {
     if args.board {
         files.push(format!("{stem}.glb"));
     }
-    files.extend(packed.iter().flat_map(|packed| changed_files(&args.output, packed)));
+    files.extend(packed.iter().flat_map(|packed| changed_files(&args.output(), packed)));
     if args.pictures {
         files.extend(PICTURES.map(|picture| format!("{stem}_{picture}.png")));
     }
     for file in &files {
         let inputs = std::iter::once(&args.target).chain(keys.iter().map(|key| &key.0));
-        refuse_input(&args.output.join(file), inputs.map(PathBuf::as_path))?;
+        refuse_input(&args.output().join(file), inputs.map(PathBuf::as_path))?;
     }
     files.push(format!("{stem}.detail.json"));
-    refuse_foreign(&args.output, &files, args.force)
+    refuse_foreign(&args.output(), &files, args.force)?;
+    let needed = space(args).beyond(replaced_bytes(&args.output(), &files));
+    if let Some(warning) = check_space(&args.output(), needed)? {
+        console.warn(warning);
+    }
+    Ok(())
 }
 
 /// Whether a tile is written: a model finds its tiles beside it, also those that were baked before.
@@ -240,7 +286,7 @@ const PICTURES: [&str; 7] =
 /// # Errors
 /// Whatever is wrong with a file or a flag; each names the file.
 pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, Error> {
-    check(args)?;
+    check(args, console)?;
     let kind = MapKind::from(args.kind);
     let format = args.format.unwrap_or_else(|| default_format(kind));
     let mut options = DetailOptions::new(format.encoding());
@@ -288,9 +334,10 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         // Two levels at a time.
         let stage = console.progress().stage("fading the layers", FADE_TRIALS * texels * 5 / 4);
         let found = bearable_opacity(&target, &layers, &options, &|n| stage.add(n))?.ok_or_else(|| {
-            Error::Usage(
-                "--fade: even without the layers the error is above that of the compressed target; take a finer --format"
-                    .into(),
+            Error::flag_error_of(
+                &args.target,
+                "--fade",
+                "even without the layers the error is above that of the compressed target; take a finer --format",
             )
         })?;
         layers.iter_mut().for_each(|layer| layer.opacity *= found);
@@ -303,11 +350,11 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         let found = lowest_resolution(&target, &layers, &options, bound, &|n| stage.add(n))?;
         resolutions = found.resolutions;
         let Some(level) = found.level else {
-            return Err(Error::Usage(format!(
-                "--max-error {bound}: even at the target's own resolution the error is {:.2}; allow more, or take \
-                 another format or tile",
+            let reason = format!(
+                "even at the target's own resolution the error is {:.2}; allow more, or take another format or tile",
                 resolutions[0].error
-            )));
+            );
+            return Err(Error::flag_error_of(&args.target, format!("--max-error {bound}"), reason));
         };
         options.first_level = level;
     }
@@ -350,12 +397,12 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         ];
         for (name, image) in PICTURES.into_iter().zip(images) {
             let file = format!("{stem}_{name}.png");
-            write_atomically(&args.output.join(&file), &encode_png(image)?)?;
+            write_atomically(&args.output().join(&file), &encode_png(image)?)?;
             files.push(file);
         }
     }
     let first = &solved.texture.levels[0];
-    let written = files.iter().map(|file| WrittenFile::of(&args.output, file)).collect::<Result<_, _>>()?;
+    let written = files.iter().map(|file| WrittenFile::of(&args.output(), file)).collect::<Result<_, _>>()?;
     let report = SolveReport {
         target: file_name(&args.target),
         files,
@@ -368,7 +415,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         comparison,
     };
     let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
-    write_atomically(&args.output.join(format!("{stem}.detail.json")), &json)?;
+    write_atomically(&args.output().join(format!("{stem}.detail.json")), &json)?;
     Ok(report)
 }
 
@@ -426,7 +473,7 @@ fn write_textures(
     solved: &Solved,
     tiles: &Tiles,
 ) -> Result<Vec<String>, Error> {
-    std::fs::create_dir_all(&args.output).map_err(|e| kinran_image::Error::io(&args.output, e))?;
+    std::fs::create_dir_all(&args.output()).map_err(|e| kinran_image::Error::io(&args.output(), e))?;
     let mut files = Vec::new();
     let mut write = |name: String, texture: &kinran_image::Texture, map: Content| -> Result<(), Error> {
         let mut texture = texture.clone();
@@ -437,7 +484,7 @@ fn write_textures(
                 "dds" => encode_dds(&texture)?,
                 _ => encode_ktx2(&texture, (args.zstd > 0).then_some(args.zstd))?,
             };
-            write_atomically(&args.output.join(&file), &bytes)?;
+            write_atomically(&args.output().join(&file), &bytes)?;
             files.push(file);
         }
         Ok(())

@@ -70,27 +70,25 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         return texture::inspect(&args.file, args.role, console);
     }
     if let Some(role) = args.role {
-        return Err(Error::Usage(format!(
-            "{}: --role {}: only textures have a role; leave the flag out",
-            args.file.display(),
-            role.name()
-        )));
+        let reason = "only textures have a role; leave the flag out";
+        return Err(Error::flag_error_of(&args.file, format!("--role {}", role.name()), reason));
     }
     if let Some(layer) = args.exr_layer.as_ref().filter(|_| !is(&["exr"])) {
-        let reason = format!("--exr-layer {layer}: only EXR files have layers; leave the flag out");
-        return Err(Error::Usage(format!("{}: {reason}", args.file.display())));
+        let reason = "only EXR files have layers; leave the flag out";
+        return Err(Error::flag_error_of(&args.file, format!("--exr-layer {layer}"), reason));
     }
     if kinran_scene::is_gltf(&args.file) || is(&["obj"]) {
-        model::inspect(&args.file, args.model.allowed()?, console)
+        model::inspect(&args.file, &args.model, console)
     } else if has_image_extension(&args.file) {
         image::inspect(&args.file, args.exr_layer.as_deref(), console)
     } else if is(&["json"]) {
         report::inspect(&args.file, console)
     } else {
-        Err(Error::Usage(format!(
-            "{}: this kind of file is not known; give a .glb, .gltf, .obj, a report of kinran (.json), a texture or an image (.{})",
-            args.file.display(),
+        let reason = format!(
+            "this kind of file is not known; give a .glb, .gltf, .obj, a report of kinran (.json), a texture or an image \
+             (.{})",
             IMAGE_EXTENSIONS.join(", .")
-        )))
+        );
+        Err(Error::file_error(&args.file, reason))
     }
 }

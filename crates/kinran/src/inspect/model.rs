@@ -1,15 +1,16 @@
 //! What is inside a glTF file.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use kinran_bake::aniso::RoughnessMaps;
 use kinran_bake::{NoSurface, material_surface};
 use kinran_image::{Pixels, full_level_count};
-use kinran_scene::{Document, LightKind, Material, Scene, TextureRef};
+use kinran_scene::{Document, LightKind, Material, Needs, Scene, TextureRef};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::bake::normal_remarks;
+use crate::model::{ModelArgs, read_scene};
 use crate::render::triangles;
 use crate::table::list;
 use crate::view::file_name;
@@ -65,10 +66,11 @@ struct CameraReport {
     yfov_degrees: f32,
 }
 
-pub(super) fn inspect(path: &Path, allowed: &[PathBuf], console: &Console) -> Result<(), Error> {
-    let scene = Scene::load_allowing(path, allowed)?;
+pub(super) fn inspect(path: &Path, args: &ModelArgs, console: &Console) -> Result<(), Error> {
+    let scene = read_scene(path, args, &Needs::ALL, &console.progress())?;
     // An OBJ has no document, and no extensions.
     let is_obj = outputs::has_extension(path, "obj");
+    let allowed = args.allowed()?;
     let document = (!is_obj).then(|| Document::open_allowing(path, allowed)).transpose()?;
     let strings = |key: &str| -> Vec<String> {
         let values = document.as_ref().and_then(|d| d.json().get(key)?.as_array());

@@ -70,13 +70,11 @@ impl State {
 pub(super) fn inspect(path: &Path, console: &Console) -> Result<(), Error> {
     let bytes = std::fs::read(path).map_err(|e| kinran_image::Error::io(path, e))?;
     let json: Value = serde_json::from_slice(&bytes)
-        .map_err(|e| Error::Usage(format!("{}: is no JSON: {e}; make it again", path.display())))?;
+        .map_err(|e| Error::file_error(path, format!("is no JSON: {e}; make it again")))?;
     let has = |members: &[&str]| members.iter().all(|member| json.get(member).is_some());
     let Some(&(written_by, kind, _)) = KINDS.iter().find(|(.., members)| has(members)) else {
-        return Err(Error::Usage(format!(
-            "{}: is no JSON that kinran writes; give a report such as NAME.kinran.json",
-            path.display()
-        )));
+        let reason = "is no JSON that kinran writes; give a report such as NAME.kinran.json";
+        return Err(Error::file_error(path, reason));
     };
     let written: Vec<WrittenFile> =
         json.get("written").and_then(|list| serde_json::from_value(list.clone()).ok()).unwrap_or_default();

@@ -32,21 +32,22 @@ struct Entry {
 pub(super) fn read(path: &Path) -> Result<Profile, Error> {
     let io = |e| Error::from(kinran_image::Error::io(path, e));
     if std::fs::metadata(path).map_err(io)?.len() > BYTES_MAX {
-        return Err(Error::Usage(format!("{}: is larger than 1 MiB, so no profile", path.display())));
+        return Err(Error::file_error(
+            path,
+            "is larger than 1 MiB, so no profile; name a .csv or .json of one",
+        ));
     }
     let text = std::fs::read_to_string(path).map_err(io)?;
     if has_extension(path, "json") {
         let sum: Sum = serde_json::from_str(&text).map_err(|e| {
-            Error::Usage(format!(
-                "{}: {e}; write {{ \"gaussians\": [ {{ \"variance\": 1, \"weight\": [1, 1, 1] }} ] }}",
-                path.display()
-            ))
+            let fix = "write { \"gaussians\": [ { \"variance\": 1, \"weight\": [1, 1, 1] } ] }";
+            Error::file_error(path, format!("{e}; {fix}"))
         })?;
         let sum = sum.gaussians.iter().map(|g| Gaussian { variance: g.variance, weight: g.weight });
         return Ok(Profile::Gaussians(sum.collect()));
     }
     if !has_extension(path, "csv") {
-        return Err(Error::Usage(format!("{}: a profile's file ends in .csv or .json", path.display())));
+        return Err(Error::file_error(path, "a profile's file ends in .csv or .json; rename it"));
     }
     let mut rows = Vec::new();
     for (i, line) in text.lines().enumerate() {
@@ -61,11 +62,9 @@ pub(super) fn read(path: &Path) -> Result<Profile, Error> {
             // The first line may name the columns.
             Err(_) if rows.is_empty() && i == 0 => {}
             _ => {
-                return Err(Error::Usage(format!(
-                    "{}: line {}: \"{line}\" is no row; write distance in mm, red, green, blue",
-                    path.display(),
-                    i + 1
-                )));
+                let reason =
+                    format!("line {}: \"{line}\" is no row; write distance in mm, red, green, blue", i + 1);
+                return Err(Error::file_error(path, reason));
             }
         }
     }

@@ -168,14 +168,13 @@ impl App {
         while let Some(event) = self.loader.event() {
             match event {
                 Event::Busy(what) => self.busy = what,
-                Event::Failed(what) => {
+                Event::Failed(error) => {
+                    self.message = error.to_string();
                     // A picture that cannot be taken any more must not keep a program waiting.
                     if self.screenshot.is_some() {
-                        self.outcome.lock().expect("no thread panics").failure =
-                            Some(Error::Usage(what.clone()));
+                        self.outcome.lock().expect("no thread panics").failure = Some(error);
                         *self.closing.lock().expect("no thread panics") = true;
                     }
-                    self.message = what;
                 }
                 Event::Opened(opened) => self.open(*opened),
                 Event::LightChanged => {
@@ -602,6 +601,7 @@ impl App {
         let baking = self.loader.baking();
         if !self.busy.is_empty() || baking.is_some() {
             egui::Area::new(egui::Id::unique("busy"))
+                .interactable(false)
                 .anchor(egui::Align2::LEFT_BOTTOM, vec2(12.0, -12.0))
                 .show(ctx, |ui| {
                     egui::Frame::popup(ui.style()).show(ui, |ui| {
@@ -616,15 +616,14 @@ impl App {
             // The bar moves while the picture stands still.
             ctx.request_repaint_after(PROGRESS_INTERVAL);
         }
-        let mut open = !self.message.is_empty();
-        // In the corner, since the model is in the middle, and above what is being done.
-        egui::Window::new("Message")
-            .open(&mut open)
-            .collapsible(false)
-            .anchor(egui::Align2::LEFT_BOTTOM, vec2(12.0, -MESSAGE_HEIGHT))
-            .show(ctx, |ui| ui.label(&self.message));
-        if !open {
-            self.message.clear();
+        // In the corner, since the model is in the middle, and above what is being done. The pointer goes through it: whoever
+        // turns the model need not look for a place where nothing stands.
+        if !self.message.is_empty() {
+            egui::Window::new("Message (Esc closes it)")
+                .collapsible(false)
+                .interactable(false)
+                .anchor(egui::Align2::LEFT_BOTTOM, vec2(12.0, -MESSAGE_HEIGHT))
+                .show(ctx, |ui| ui.add(egui::Label::new(&self.message).selectable(false)));
         }
         if !self.shader_error.is_empty() && !self.posing {
             egui::Window::new("Shader").anchor(egui::Align2::LEFT_TOP, vec2(12.0, 12.0)).show(ctx, |ui| {

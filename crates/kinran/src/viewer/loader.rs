@@ -45,7 +45,7 @@ pub(super) enum Event {
     /// What is being read; empty when nothing is.
     Busy(String),
     /// What went wrong.
-    Failed(String),
+    Failed(Error),
 }
 
 /// A model that was just read.
@@ -145,7 +145,7 @@ impl Loader {
                 let _ = tell(Event::Busy(work.describe(&job)));
                 let heard = match work.run(job) {
                     Ok(events) => events.into_iter().all(tell),
-                    Err(error) => tell(Event::Failed(error.to_string())),
+                    Err(error) => tell(Event::Failed(error)),
                 };
                 if !(heard && tell(Event::Busy(String::new()))) {
                     return;
@@ -211,7 +211,8 @@ impl Work {
     fn run(&mut self, job: Job) -> Result<Vec<Event>, Error> {
         match job {
             Job::Open(path, args) => {
-                let Model { path, scene, only_baked } = Model::open(&path, &args.model)?;
+                let Model { path, scene, only_baked } =
+                    Model::open(&path, &args.model, &Progress::new(false))?;
                 let view = View::new(&scene, &path.to_string_lossy(), &args)?;
                 let plain = vec![None; scene.materials.len()];
                 let prepared = view.scene(&scene, plain)?;
@@ -290,9 +291,9 @@ impl Work {
 /// Puts the built-in shaders into a folder, as far as they are not there.
 ///
 /// # Errors
-/// [`Error::Usage`] and [`Error::Image`] when it cannot be written.
+/// [`Error::Image`] when it cannot be written.
 pub(super) fn fill_shader_folder(folder: &Path) -> Result<(), Error> {
-    std::fs::create_dir_all(folder).map_err(|e| Error::Usage(format!("{}: {e}", folder.display())))?;
+    std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
     for (name, text) in ShaderSource::files() {
         let path = folder.join(name);
         if !path.exists() {

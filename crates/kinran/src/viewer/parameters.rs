@@ -288,11 +288,12 @@ impl Parameters {
     /// Reads what [`Parameters::save`] wrote.
     ///
     /// # Errors
-    /// [`Error::Usage`] with the file and what is wrong in it.
+    /// One with the file and what is wrong in it.
     pub(super) fn load(path: &Path) -> Result<Self, Error> {
-        let complain = |e: &dyn std::fmt::Display| Error::Usage(format!("{}: {e}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|e| complain(&e))?;
-        let parameters: Self = serde_json::from_str(&text).map_err(|e| complain(&e))?;
+        let complain = |reason: String| Error::file_error(path, reason);
+        let text = std::fs::read_to_string(path).map_err(|e| kinran_image::Error::io(path, e))?;
+        let parameters: Self = serde_json::from_str(&text)
+            .map_err(|e| complain(format!("{e}; save the parameters again in the window")))?;
         let checks = [
             ("methods", parameters.methods.iter().all(|&m| m < METHODS.len()), "two numbers from 0 to 5"),
             ("channel", parameters.channel < CHANNELS.len(), "a number from 0 to 6"),
@@ -301,7 +302,7 @@ impl Parameters {
         ];
         for (field, good, want) in checks {
             if !good {
-                return Err(complain(&format!("{field} must be {want}")));
+                return Err(complain(format!("{field} must be {want}")));
             }
         }
         Ok(parameters)

@@ -97,7 +97,7 @@ fn flags_that_make_no_sense_are_named() {
     refused(&["render", text(&model), "-o", text(&out), "--env", text(&model)], &["square.glb"]);
     refused(&["compare", text(&model), "-o", text(&out), "--filters", "ml,,naive"], &["--filters"]);
     refused(&["compare", text(&model), "-o", text(&out), "--distances", "0.5"], &["--distances"]);
-    refused(&["render", text(&model)], &["--output"]);
+    refused(&["render"], &["<FILE>"]);
     refused(&["bak", text(&model)], &["bak"]);
     assert_eq!(files(folder.path()), ["square.glb"]);
 }

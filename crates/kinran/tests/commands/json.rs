@@ -5,134 +5,8 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::common::{bumps, kinran, kinran_json, square, text};
+use crate::shape::valid;
 use kinran_image::{Channels, Image, Pixels, write_png};
-
-/// The members that a schema knows, those of what it refers to too; `None` where any may be there.
-fn members<'a>(schema: &'a Value, root: &'a Value) -> Option<Vec<&'a String>> {
-    let rules = schema.as_object()?;
-    if rules.contains_key("additionalProperties") {
-        return None;
-    }
-    let mut known: Vec<&String> = Vec::new();
-    known.extend(
-        rules.get("properties").and_then(Value::as_object).into_iter().flat_map(|object| object.keys()),
-    );
-    for rule in ["anyOf", "oneOf", "allOf"] {
-        for schema in rules.get(rule).and_then(Value::as_array).into_iter().flatten() {
-            known.extend(members(schema, root)?);
-        }
-    }
-    if let Some(target) = rules.get("$ref") {
-        known.extend(members(definition(target, root), root)?);
-    }
-    Some(known)
-}
-
-fn definition<'a>(target: &Value, root: &'a Value) -> &'a Value {
-    let place = target.as_str().unwrap().trim_start_matches('#');
-    root.pointer(place).unwrap_or_else(|| panic!("{target} is nowhere"))
-}
-
-/// What of `value` is not as `schema` says, or stands nowhere in it.
-fn wrong(schema: &Value, root: &Value, value: &Value, place: &str, found: &mut Vec<String>) {
-    if let (Some(known), Some(object)) = (members(schema, root), value.as_object()) {
-        let unknown = object.keys().filter(|name| !known.contains(name));
-        found.extend(unknown.map(|name| format!("{place}.{name}: stands in no schema")));
-    }
-    broken(schema, root, value, place, found);
-}
-
-/// The rules of `schema` that `value` breaks, those rules that the committed schemas have; any other is an error here.
-/// `root` has the definitions.
-fn broken(schema: &Value, root: &Value, value: &Value, place: &str, found: &mut Vec<String>) {
-    let ok = |schema: &Value| {
-        let mut found = Vec::new();
-        broken(schema, root, value, place, &mut found);
-        found.is_empty()
-    };
-    let Some(rules) = schema.as_object() else {
-        if schema == &Value::Bool(false) {
-            found.push(format!("{place}: must not be there"));
-        }
-        return;
-    };
-    let no_items = Vec::new();
-    for (rule, wanted) in rules {
-        let list = wanted.as_array().unwrap_or(&no_items);
-        let holds = match rule.as_str() {
-            "title" | "description" | "$schema" | "$defs" | "format" | "default" => true,
-            "type" => {
-                let is = |name: &Value| match name.as_str().unwrap() {
-                    "null" => value.is_null(),
-                    "boolean" => value.is_boolean(),
-                    "string" => value.is_string(),
-                    "array" => value.is_array(),
-                    "object" => value.is_object(),
-                    "number" => value.is_number(),
-                    "integer" => value.is_i64() || value.is_u64(),
-                    other => panic!("{place}: type {other}"),
-                };
-                if wanted.is_array() { list.iter().any(is) } else { is(wanted) }
-            }
-            "minimum" => value.as_f64().is_none_or(|value| value >= wanted.as_f64().unwrap()),
-            "maximum" => value.as_f64().is_none_or(|value| value <= wanted.as_f64().unwrap()),
-            "minItems" => value.as_array().is_none_or(|items| items.len() as u64 >= wanted.as_u64().unwrap()),
-            "maxItems" => value.as_array().is_none_or(|items| items.len() as u64 <= wanted.as_u64().unwrap()),
-            "const" => value == wanted,
-            "enum" => list.contains(value),
-            "anyOf" => list.iter().any(ok),
-            "oneOf" => list.iter().filter(|schema| ok(schema)).count() == 1,
-            "allOf" => list.iter().all(ok),
-            "required" => list.iter().all(|name| value.get(name.as_str().unwrap()).is_some()),
-            "$ref" => {
-                broken(definition(wanted, root), root, value, place, found);
-                true
-            }
-            "items" => {
-                for (i, item) in value.as_array().into_iter().flatten().enumerate() {
-                    wrong(wanted, root, item, &format!("{place}[{i}]"), found);
-                }
-                true
-            }
-            "properties" => {
-                for (name, schema) in wanted.as_object().unwrap() {
-                    if let Some(value) = value.get(name) {
-                        wrong(schema, root, value, &format!("{place}.{name}"), found);
-                    }
-                }
-                true
-            }
-            "additionalProperties" => {
-                for (name, value) in value.as_object().into_iter().flatten() {
-                    if rules.get("properties").is_none_or(|known| known.get(name).is_none()) {
-                        wrong(wanted, root, value, &format!("{place}.{name}"), found);
-                    }
-                }
-                true
-            }
-            other => panic!("{place}: the schemas have come to use {other}"),
-        };
-        if !holds {
-            found.push(format!("{place}: {rule} {wanted}"));
-        }
-    }
-}
-
-/// Asserts that a document has the shape that docs/schema/json/NAME.schema.json says.
-fn valid(name: &str, document: &Value) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/schema/json");
-    let schema = std::fs::read_to_string(folder.join(format!("{name}.schema.json"))).unwrap();
-    let schema: Value = serde_json::from_str(&schema).unwrap();
-    let against = |document: &Value| {
-        let mut found = Vec::new();
-        wrong(&schema, &schema, document, "$", &mut found);
-        found
-    };
-    let found = against(document);
-    assert!(found.is_empty(), "{name}: {found:#?} in {document:#}");
-    assert!(!against(&Value::Null).is_empty(), "{name} takes anything");
-    assert!(!against(&serde_json::json!({ "velvet": 1 })).is_empty(), "{name} takes any member");
-}
 
 /// A folder with a material in each of two folders.
 fn materials() -> tempfile::TempDir {
@@ -253,7 +127,7 @@ fn an_error_is_one_document_whoever_finds_it() {
         (&["inspect", text(&torn)], "malformed", Some(&torn)),
         (&["init", text(&empty)], "input", Some(&empty)),
         // What is wrong with words is found before a command runs.
-        (&["render", text(&model)], "usage", None),
+        (&["render"], "usage", None),
         (&["bake", "x", "--sharpness", "3"], "usage", None),
         (&["bak"], "usage", None),
         (&["render", text(&model), "-o", "p.png", "--size", "huge"], "usage", None),
@@ -289,4 +163,229 @@ fn an_error_is_one_document_whoever_finds_it() {
     let report: Value = serde_json::from_str(&said.out).unwrap();
     valid("bake-manifest", &report);
     assert_eq!(report["entries"][0]["status"], "failed", "{report}");
+}
+
+/// The words that lead to each command that does something, and the command.
+fn commands<'a>(
+    command: &'a clap::Command,
+    path: &[String],
+    all: &mut Vec<(Vec<String>, &'a clap::Command)>,
+) {
+    if !command.has_subcommands() {
+        all.push((path.to_vec(), command));
+    }
+    for inner in command.get_subcommands() {
+        commands(inner, &[path, &[inner.get_name().to_owned()]].concat(), all);
+    }
+}
+
+/// Runs a command that must fail; gives its error, which has the shape of its schema and exit code 2.
+fn error_of(folder: &Path, args: &[&str]) -> Value {
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_kinran"))
+        .args(args)
+        .arg("--json")
+        .current_dir(folder)
+        .env_remove("KINRAN_CACHE")
+        .output()
+        .unwrap();
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(2), "{args:?}: {out}{err}");
+    assert!(!err.contains("panicked"), "{args:?}: {err}");
+    let document: Value = serde_json::from_str(&out).unwrap_or_else(|e| panic!("{args:?}: {e}: {out}{err}"));
+    valid("error", &document);
+    assert_eq!(document["error"]["exit_code"], 2, "{args:?}: {document}");
+    document["error"].clone()
+}
+
+/// Every flag of every command that takes a value other than a path, with one that is none.
+#[test]
+fn a_value_that_is_none_is_told_without_its_flag() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = kinran::cli::command();
+    let mut all = Vec::new();
+    commands(&program, &[], &mut all);
+    let is_path = |flag: &clap::Arg| {
+        flag.get_value_parser().type_id() == clap::value_parser!(std::path::PathBuf).type_id()
+    };
+    let mut tried = 0;
+    for (path, command) in &all {
+        let path: Vec<&str> = path.iter().map(String::as_str).collect();
+        if path == ["view"] && !cfg!(feature = "view") {
+            continue;
+        }
+        let unknown = error_of(folder.path(), &[&path[..], &["--sharpness"]].concat());
+        assert_eq!(
+            (&unknown["code"], &unknown["flag"]),
+            (&"usage".into(), &"--sharpness".into()),
+            "{path:?}"
+        );
+        for flag in command.get_arguments().filter(|flag| flag.get_action().takes_values() && !is_path(flag))
+        {
+            let Some(long) = flag.get_long().map(|long| format!("--{long}")) else { continue };
+            let word = format!("{long}=no/such=value");
+            let error = error_of(folder.path(), &[&path[..], &[&word]].concat());
+            assert_eq!(error["code"], "usage", "{path:?} {word}: {error}");
+            // Where any word may be a name, it is taken, and something else is missing.
+            let missing = error["message"].as_str().is_some_and(|text| text.contains("were not provided"));
+            assert!(error["flag"] == long || missing, "{path:?} {word}: {error}");
+            tried += usize::from(!missing);
+        }
+        // A positional argument that must be there.
+        if let Some(first) = command.get_positionals().find(|argument| argument.is_required_set()) {
+            let name = format!("<{}>", first.get_value_names().unwrap()[0]);
+            let error = error_of(folder.path(), &path);
+            assert!(
+                error["flag"] == name || error["flag"].as_str().unwrap().starts_with("--"),
+                "{path:?}: {error}"
+            );
+        }
+    }
+    assert!(tried > 150, "only {tried} flags");
+    assert!(crate::common::files(folder.path()).is_empty(), "{:?}", crate::common::files(folder.path()));
+}
+
+/// A file of every command that is missing, a folder, damaged, or in the way, and a flag that does not suit it.
+#[test]
+fn a_file_or_flag_is_told_in_words_alone() {
+    let (folder, model) = square();
+    let library = materials();
+    let place = |name: &str| folder.path().join(name);
+    std::fs::write(place("torn.glb"), b"glTF\x02\0\0\0 and no more").unwrap();
+    std::fs::write(place("torn.png"), b"\x89PNG\r\n\x1a\nnothing").unwrap();
+    for name in ["torn.ktx2", "torn.json", "torn.csv", "torn.exr", "notes.txt", "index.html"] {
+        std::fs::write(place(name), "nothing,at all").unwrap();
+    }
+    std::fs::create_dir(place("empty")).unwrap();
+    std::fs::create_dir(place("shaders")).unwrap();
+    std::fs::write(place("shaders/forwards.wgsl"), "").unwrap();
+    std::fs::write(place("twice.toml"), "[[aniso]]\ninput = 3\n").unwrap();
+    let maps = library.path().join("tin");
+    let (maps, tin) = (text(&maps), text(library.path()));
+    let (model, gone) = (text(&model), "gone.glb");
+    let color = format!("{maps}/tin_color.png");
+    let layer = format!("--layer={color}");
+    // Words, and the file and the flag that the error must name.
+    let cases: Vec<(Vec<&str>, &str, &str)> = vec![
+        (vec!["bake", gone], gone, ""),
+        (vec!["bake", "torn.glb"], "torn.glb", ""),
+        (vec!["bake", "notes.txt"], "notes.txt", ""),
+        (vec!["bake", "empty"], "empty", ""),
+        (vec!["bake", model, "-o", "notes.txt"], "notes.txt", ""),
+        (vec!["bake", model, "--edges", "clamp"], model, "--edges"),
+        (vec!["bake", model, "--watch"], model, "--watch"),
+        (vec!["bake", model, "--skin", "leather"], model, "--skin"),
+        (vec!["bake", model, "--allow-outside", "gone"], "", "--allow-outside"),
+        (vec!["bake", maps, "--normal-format", "bc4"], "", "--normal-format"),
+        (vec!["bake", maps, "--map", "normal=gone.png"], "", "--map"),
+        (vec!["bake", maps, "--ignore", "gone.png"], "", "--ignore"),
+        (vec!["bake", "twice.toml"], "twice.toml", ""),
+        (vec!["bake", "gone.toml"], "gone.toml", ""),
+        (vec!["bake", "twice.toml", "--force"], "twice.toml", "--force"),
+        (vec!["init", "empty"], "empty", ""),
+        (vec!["init", "gone"], "gone", ""),
+        (vec!["cache", "--cache", "empty"], "empty", ""),
+        (vec!["render", gone], gone, ""),
+        (vec!["render", "torn.glb"], "torn.glb", ""),
+        (vec!["render", model, "-o", "p.gif"], "p.gif", ""),
+        (vec!["render", model, "-o", "gone/p.png"], "gone/p.png", ""),
+        (vec!["render", model, "--env", "gone.hdr"], "gone.hdr", ""),
+        (vec!["render", model, "--env", "torn.exr"], "torn.exr", ""),
+        (vec!["render", model, "--camera", "3"], model, "--camera"),
+        (vec!["render", model, "--filter", "baked"], model, "--filter"),
+        (vec!["render", "empty"], "empty", ""),
+        (vec!["compare", gone], gone, ""),
+        (vec!["compare", "torn.glb"], "torn.glb", ""),
+        (vec!["compare", model, "-o", "notes.txt"], "notes.txt", ""),
+        (vec!["detail", "solve", "gone.png", &layer], "gone.png", ""),
+        (vec!["detail", "solve", "torn.png", &layer], "torn.png", ""),
+        (vec!["detail", "solve", &color, "--layer=gone.png"], "gone.png", ""),
+        (vec!["detail", "solve", &color, &layer, "--model", gone], gone, ""),
+        (vec!["detail", "solve", &color, &layer, "--model", model, "--material", "tin"], model, "--material"),
+        (vec!["detail", "solve", &color, &layer, "--max-error", "0"], &color, "--max-error"),
+        (vec!["detail", "report", "empty"], "empty", ""),
+        (vec!["detail", "report", "gone"], "gone", ""),
+        (vec!["detail", "report", tin, "-o", "."], "./index.html", ""),
+        (vec!["inspect", "gone.png"], "gone.png", ""),
+        (vec!["inspect", "torn.ktx2"], "torn.ktx2", ""),
+        (vec!["inspect", "torn.json"], "torn.json", ""),
+        (vec!["inspect", "notes.txt"], "notes.txt", ""),
+        (vec!["inspect", &color, "--role", "normal"], &color, "--role"),
+        (vec!["fit", "fuzz", "--tilt", "30", "--spread", "0.2", "--plots", "p.png"], "p.png", ""),
+        (vec!["fuzz", gone], gone, ""),
+        (vec!["fuzz", model, "-o", "notes.txt"], "notes.txt", ""),
+        (vec!["fuzz", model, "--color", "2,0,0"], "", "--color"),
+        (vec!["skin", gone], gone, ""),
+        (vec!["skin", "torn.glb"], "torn.glb", ""),
+        (vec!["skin", model, "--base", "0,0,7"], "", "--base"),
+        (vec!["skin-lut", "--profile", "gone.csv"], "gone.csv", ""),
+        (vec!["skin-lut", "--profile", "torn.csv"], "torn.csv", ""),
+        (vec!["skin-lut", "--profile", "torn.json"], "torn.json", ""),
+        (vec!["skin-lut", "--burley", "0,0,0"], "", "--burley"),
+        (vec!["skin-lut", "--albedo", "1,1,1"], "", "--mean-free-path"),
+        (vec!["skin-lut", "-o", "notes.txt"], "notes.txt", ""),
+        (vec!["shaders", "--lang", "wgsl", "--module", "velvet"], "", "--module"),
+        (vec!["shaders", "--lang", "spirv"], "", "--lang"),
+        (vec!["shaders", "--lang", "wgsl", "-o", "notes.txt"], "notes.txt", ""),
+        (vec!["demo", "--quick", "-o", "notes.txt"], "notes.txt", ""),
+        (vec!["demo", "--quick", "-o", "."], "./index.html", ""),
+        (vec!["man", "-o", "notes.txt"], "notes.txt", ""),
+        (vec!["completions", "cmd"], "", "<SHELL>"),
+    ];
+    let views = [
+        (vec!["view", gone], gone, ""),
+        (vec!["view", model, "--parameters", "gone.json"], "gone.json", ""),
+        (vec!["view", model, "--parameters", "torn.json"], "torn.json", ""),
+        (vec!["view", model, "--screenshot", "p.gif"], "p.gif", ""),
+    ];
+    let named = cases.into_iter().chain(views.into_iter().filter(|_| cfg!(feature = "view")));
+    let mut commands_tried = std::collections::BTreeSet::new();
+    for (args, file, flag) in named {
+        commands_tried.insert(args[0].to_owned());
+        let error = error_of(folder.path(), &args);
+        let [got_file, got_flag] = ["file", "flag"].map(|key| error[key].as_str().unwrap_or(""));
+        assert_eq!((got_file, got_flag), (file, flag), "{args:?}: {error}");
+    }
+    for command in kinran::cli::command().get_subcommands() {
+        let name = command.get_name();
+        assert!(commands_tried.contains(name) || name == "view", "no error of {name} was tried");
+    }
+    let before = ["empty", "index.html", "notes.txt", "shaders", "square.glb"];
+    let left: Vec<String> = crate::common::files(folder.path());
+    let others: Vec<&String> =
+        left.iter().filter(|name| !before.contains(&name.as_str()) && !name.contains("torn")).collect();
+    assert_eq!(others, ["twice.toml"], "something was written");
+}
+
+/// What an entry of a library fails by has the shape of any error.
+#[test]
+fn an_entry_s_error_is_told_in_words_alone() {
+    let (folder, _) = square();
+    let library = materials();
+    let color = library.path().join("tin/tin_color.png");
+    std::fs::write(library.path().join("lead/lead_normal.png"), "torn").unwrap();
+    let manifest = library.path().join("kinran.toml");
+    let entries = format!(
+        "cache = \"{}\"\n[[aniso]]\ninput = \"*\"\n[[detail]]\ninput = \"{}\"\nmax-error = 0\nlayer = [\"{}\"]\n",
+        text(&folder.path().join("cache")),
+        text(&color),
+        text(&color)
+    );
+    std::fs::write(&manifest, entries).unwrap();
+    let said = kinran(&["bake", text(&manifest), "--json"]);
+    assert_eq!(said.code, Some(2), "{}{}", said.out, said.err);
+    let report: Value = serde_json::from_str(&said.out).unwrap();
+    valid("bake-manifest", &report);
+    let errors: Vec<&Value> = report["entries"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|entry| &entry["error"])
+        .filter(|error| !error.is_null())
+        .collect();
+    let torn = library.path().join("lead/lead_normal.png");
+    let wanted = [(text(&torn), Value::Null), (text(&color), "--max-error".into())];
+    assert_eq!(errors.len(), wanted.len(), "{report:#}");
+    for (error, (file, flag)) in errors.iter().zip(&wanted) {
+        assert_eq!((error["file"].as_str(), &error["flag"]), (Some(*file), flag), "{error}");
+    }
 }

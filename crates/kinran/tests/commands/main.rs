@@ -8,4 +8,5 @@ mod inspect;
 mod json;
 mod render;
 mod shaders;
+mod shape;
 mod trust;

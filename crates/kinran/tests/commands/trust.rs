@@ -360,3 +360,154 @@ fn what_no_map_gives_is_metal_and_rough_in_silence() {
     assert_eq!(bake(&["--roughness", "0.2"])["warnings"], json!([]));
     assert_eq!((orm()[1] * 255.0).round(), 51.0);
 }
+
+#[test]
+fn output_that_nobody_named_a_place_for_is_not_told() {
+    let (folder, model) = square();
+    let place = |name: &str| folder.path().join(name);
+    let maps = place("maps");
+    std::fs::create_dir(&maps).unwrap();
+    for name in ["a_nor_gl.png", "a_color.png"] {
+        std::fs::write(maps.join(name), encode_png(&bumps()).unwrap()).unwrap();
+    }
+    let profile = place("p.csv");
+    std::fs::write(&profile, "0,1,1,1\n1,0.5,0.5,0.5\n2,0,0,0\n").unwrap();
+    let (color, layer) = (maps.join("a_color.png"), format!("--layer={}", text(&maps.join("a_color.png"))));
+    let report = place("library");
+    std::fs::create_dir(&report).unwrap();
+    std::fs::create_dir(report.join("tin")).unwrap();
+    std::fs::copy(&color, report.join("tin/tin_color.png")).unwrap();
+    let (model, few) = (text(&model), ["--size", "8x8", "--spp", "1"]);
+    let cases: [(&[&str], &[&str], &str); 9] = [
+        (&["bake", model], &[], "baked/square.glb"),
+        (&["bake", text(&maps)], &[], "baked/a_normal.ktx2"),
+        (&["render", model], &few, "square.render.png"),
+        (&["compare", model, "--truth-spp", "1", "--distances", "1"], &few, "square.compare/compare.png"),
+        (&["fuzz", model, "--sheet", "density"], &few, "square.fuzz/density.png"),
+        (&["skin", model, "--sheet", "shadows"], &few, "square.skin/shadows.png"),
+        (&["skin-lut", "--profile", text(&profile), "--size", "8x8"], &[], "baked/skin.png"),
+        (&["detail", "solve", text(&color), &layer], &[], "maps/baked/a_color.detail.json"),
+        (
+            &["detail", "report", text(&report), "--size", "16", "--format", "bc1"],
+            &[],
+            "library.report/index.html",
+        ),
+    ];
+    for (words, more, file) in cases {
+        let said = kinran(&[words, more].concat());
+        assert_eq!(said.code, Some(0), "{words:?}: {}", said.err);
+        assert!(place(file).is_file(), "{words:?}: no {file}; {}", said.err);
+        let top = place(file.strip_suffix("/compare.png").unwrap_or(file));
+        let told =
+            text(if top.is_file() && !file.ends_with(".render.png") { top.parent().unwrap() } else { &top });
+        assert!(
+            said.err.contains("no --output was given") && said.err.contains(told),
+            "{words:?}: {}",
+            said.err
+        );
+        // Who is quiet, or named a place, hears nothing of it.
+        let quiet = kinran(&[words, more, &["--quiet"]].concat());
+        assert_eq!((quiet.code, quiet.err.as_str()), (Some(0), ""), "{words:?}");
+    }
+}
+
+/// The bytes that a library's files are said to take, and those that they take.
+#[test]
+fn a_library_does_not_know_what_it_will_take() {
+    let (folder, _) = square();
+    let place = |name: &str| folder.path().join(name);
+    std::fs::create_dir_all(place("maps/a")).unwrap();
+    for (name, image) in [("a_nor_gl", bumps()), ("a_color", bumps())] {
+        std::fs::write(place("maps/a").join(format!("{name}.png")), encode_png(&image).unwrap()).unwrap();
+    }
+    std::fs::write(place("maps/tile.png"), encode_png(&bumps()).unwrap()).unwrap();
+    let entries = [
+        "[[aniso]]\ninput = \"maps/a\"\nform = \"both\"\ncontainer = \"both\"\n",
+        "[[mesh]]\ninput = \"square.glb\"\nall-textures = true\n",
+        "[[detail]]\ninput = \"maps/tile.png\"\nlayer = [\"maps/a/a_color.png\"]\npictures = true\n",
+        "[[skin]]\nsize = \"64x64\"\npenumbra = true\n",
+    ];
+    let manifest = place("kinran.toml");
+    let (cache, out) = (place("cache"), place("baked"));
+    let args = ["bake", text(&manifest), "--cache", text(&cache)];
+    for entry in entries {
+        std::fs::write(&manifest, entry).unwrap();
+        let dry = kinran_json(&[&args[..], &["--dry-run"]].concat());
+        let wet = kinran_json(&args);
+        assert_eq!(dry["space"], wet["space"], "{entry}");
+        let [least, most] = ["least", "most"].map(|key| wet["space"][key].as_u64().unwrap());
+        let files = wet["entries"][0]["files"].as_array().unwrap();
+        let bytes: u64 = files.iter().map(|file| file["bytes"].as_u64().unwrap()).sum();
+        // Reports and plots are small.
+        let small: u64 = files
+            .iter()
+            .filter(|file| file["name"].as_str().unwrap().ends_with(".json") || file["name"] == "skin.png")
+            .map(|file| file["bytes"].as_u64().unwrap())
+            .sum();
+        assert!(0 < least && least <= bytes, "{entry}: {least} bytes at least, {bytes} written: {files:#?}");
+        // A small texture is its header; a PNG of noise is larger than its texels.
+        let headers = 700 * files.len() as u64;
+        assert!(
+            bytes <= most + small + headers,
+            "{entry}: {most} bytes at most, {bytes} written: {files:#?}"
+        );
+
+        // What stands is replaced, and what is kept is known to the byte.
+        let nothing = serde_json::json!({ "least": 0, "most": 0 });
+        assert_eq!(kinran_json(&args)["space"], nothing, "{entry}");
+        std::fs::remove_dir_all(&out).unwrap();
+        let kept = kinran_json(&[&args[..], &["--dry-run"]].concat());
+        assert_eq!(kept["space"], serde_json::json!({ "least": bytes, "most": bytes }), "{entry}");
+        let said = kinran(&[&args[..], &["--dry-run"]].concat());
+        assert!(said.out.contains("the files will take"), "{}", said.out);
+    }
+}
+
+/// The beginning of a PNG of so many texels along a side: enough to know its size.
+fn png_header(side: u32) -> Vec<u8> {
+    let size = [side.to_be_bytes(), side.to_be_bytes()].concat();
+    let header = png_chunk(b"IHDR", &[&size[..], &[8, 2, 0, 0, 0]].concat());
+    [&b"\x89PNG\r\n\x1a\n"[..], &header, &png_chunk(b"IDAT", &[])].concat()
+}
+
+fn png_chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let chunk = [name, data].concat();
+    // CRC-32 as PNG has it.
+    let crc = chunk.iter().fold(u32::MAX, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & 0_u32.wrapping_sub(crc & 1)))
+    });
+    let length = u32::try_from(data.len()).unwrap().to_be_bytes();
+    [&length[..], &chunk, &(!crc).to_be_bytes()].concat()
+}
+
+#[test]
+fn a_library_fills_the_disk_before_it_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let add = |from: u64, to: u64| {
+        for i in from..to {
+            std::fs::create_dir_all(place(&format!("maps/m{i}"))).unwrap();
+            std::fs::write(place(&format!("maps/m{i}/m_nor_gl.png")), png_header(16384)).unwrap();
+        }
+    };
+    let manifest = place("kinran.toml");
+    let flags =
+        "container = \"dds\"\nform = \"both\"\nnormal-format = \"rgba16f\"\naniso-format = \"rgba16f\"\n";
+    std::fs::write(&manifest, format!("[defaults]\n{flags}[[aniso]]\ninput = \"maps/*\"\n")).unwrap();
+    let (cache, out) = (place("cache"), place("baked"));
+    let args = ["bake", text(&manifest), "--cache", text(&cache)];
+    add(0, 1);
+    let one = kinran_json(&[&args[..], &["--dry-run"]].concat())["space"]["least"].as_u64().unwrap();
+    // Four textures of eight bytes a texel, and a third for their mips.
+    assert!(one > 4 * 8 * 16384 * 16384, "{one} bytes");
+    let free = fs4::available_space(folder.path()).unwrap();
+    let count = free / one + 2;
+    if count > 5000 {
+        return;
+    }
+    add(1, count);
+    refused(&args, &["baked", "take at least", "free some space"]);
+    assert!(files(folder.path()).iter().all(|name| name != "cache"), "something was kept");
+    let written = if out.exists() { files(&out) } else { Vec::new() };
+    assert!(written.iter().all(|name| name == ".kinran"), "{written:?}");
+}

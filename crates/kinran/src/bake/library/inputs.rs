@@ -15,7 +15,7 @@ use kinran_scene::Document;
 
 use super::super::file_name;
 use super::super::settings::Flags;
-use crate::Error;
+use crate::{Error, Failure};
 
 /// Part of every key. To be raised whenever the same version bakes other bytes from the same files and flags; a test
 /// holds the bytes of a small library against it (`tests/library.rs`).
@@ -237,7 +237,10 @@ impl Copies {
                 Component::RootDir | Component::CurDir => {}
                 Component::ParentDir => {
                     depth = depth.checked_sub(1).ok_or_else(|| {
-                        Error::Usage(format!("{}: leads above the topmost folder", original.display()))
+                        Error::file_error(
+                            original,
+                            "leads above the topmost folder; write a path that exists",
+                        )
                     })?;
                     place.push("..");
                 }
@@ -262,11 +265,9 @@ impl Copies {
         match self.copied.get(&resolved) {
             Some(known) if *known == from => {}
             Some(known) => {
-                return Err(Error::Usage(format!(
-                    "{} and {} differ only by a link on the way to them; rename one",
-                    known.display(),
-                    from.display()
-                )));
+                let reason =
+                    format!("and {} differ only by a link on the way to them; rename one", from.display());
+                return Err(Error::file_error(known, reason));
             }
             None => {
                 copy_whole(original, &place).map_err(fail)?;
@@ -296,7 +297,10 @@ impl Copies {
     }
 
     fn as_about_originals(&self, error: Error) -> Error {
-        Error::Usage(self.original_names(&error.to_string()))
+        let failure = Failure::of(&error);
+        let message = self.original_names(&failure.message);
+        let file = failure.file.map(|file| PathBuf::from(self.original_names(&file.to_string_lossy())));
+        Error::Retold(Box::new(Failure { message, file, ..failure }))
     }
 
     fn original_names(&self, text: &str) -> String {
