@@ -10,6 +10,8 @@ use kinran_render::{
 };
 
 use crate::view::View;
+#[cfg(feature = "gpu")]
+use crate::view::samples_of;
 use crate::{Error, Progress};
 
 /// What draws a picture.
@@ -90,8 +92,10 @@ impl Painter {
                 let scene = renderer.load(scene, &renderer.light_of(scene), filtering);
                 let stage = progress.stage(name, u64::from(samples_per_pixel));
                 let (settings, samples) = (settings(view), samples_per_pixel);
-                Ok(renderer
-                    .film(&scene, &view.camera, &settings, view.size, samples, &|_, _| stage.add(1))?)
+                Ok(renderer.film(&scene, &view.camera, &settings, view.size, samples, &|_, _| {
+                    stage.add(1);
+                    progress.drawn(samples_of(view.size, 1));
+                })?)
             }
         }
     }

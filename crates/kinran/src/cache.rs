@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::bake::{LibraryArgs, cache_folder};
+use crate::outputs::bytes_text;
 use crate::table::list;
 use crate::{Console, Error};
 
@@ -79,9 +80,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
 
     let mut text = list(&entries.iter().map(row).collect::<Vec<_>>());
     if removed > 0 {
-        text += &format!("{removed} entries removed, {}\n", mib(removed_bytes));
+        text += &format!("{removed} entries removed, {}\n", bytes_text(removed_bytes));
     }
-    text += &format!("{} entries, {}, in {}\n", entries.len(), mib(bytes), folder.display());
+    text += &format!("{} entries, {}, in {}\n", entries.len(), bytes_text(bytes), folder.display());
     console.result(&CacheReport { folder, bytes, entries, removed, removed_bytes }, &text)
 }
 
@@ -92,9 +93,5 @@ fn row(entry: &Listed) -> Vec<String> {
         1 => "used yesterday".into(),
         days => format!("used {days} days ago"),
     };
-    vec![entry.key[..entry.key.len().min(12)].into(), mib(entry.bytes), idle, entry.name.clone()]
-}
-
-fn mib(bytes: u64) -> String {
-    format!("{:.1} MiB", bytes as f64 / (1 << 20) as f64)
+    vec![entry.key[..entry.key.len().min(12)].into(), bytes_text(entry.bytes), idle, entry.name.clone()]
 }

@@ -187,7 +187,7 @@ fn numbers(
 
 /// What noise alone comes to.
 fn noise(sheet: &mut Picture, scale: &Scale, at: (u32, u32), finding: &Finding) {
-    let text = format!("noise {:.4} / {:.4}", finding.noise.rmse, finding.noise.flip);
+    let text = format!("noise: RMSE {:.4} FLIP {:.4}", finding.noise.rmse, finding.noise.flip);
     sheet.text(at, scale.note(), FAINT, &text);
 }
 

@@ -24,7 +24,7 @@ use crate::model::Model;
 use crate::picture::{Picture, Row, grid};
 use crate::surfaces::{Mips, fuzz_fits, scene_surfaces};
 use crate::values::{number, vector};
-use crate::view::{EnvironmentChoice, View, ViewArgs, file_name};
+use crate::view::{EnvironmentChoice, View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, outputs};
 
 /// Draws a model with fuzz, a sheet of pictures for each parameter
@@ -234,12 +234,15 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     } else {
         view.clone()
     };
+    let all = progress.busy("sheets");
+    let progress = progress.overall(&all);
     let studio = Studio { args, prepared, view, parameters, painter, progress: &progress };
+    let pictures: usize = sheets.iter().map(|&sheet| studio.count(sheet)).sum();
+    all.expect(pictures as u64 * samples_of(args.view.size, args.spp));
 
     std::fs::create_dir_all(&output).map_err(|e| kinran_image::Error::io(&output, e))?;
     let mut text = String::new();
     let (mut files, mut flip) = (Vec::new(), Vec::new());
-    let all = progress.stage("sheets", sheets.len() as u64);
     for sheet in sheets {
         let name = sheet_file(sheet);
         let picture = match &realtime {
@@ -252,7 +255,6 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         };
         picture.write(&output.join(&name))?;
         files.push(name);
-        all.add(1);
     }
     drop(all);
     for Difference { light, flip } in &flip {
@@ -361,6 +363,15 @@ impl Studio<'_> {
                 [0.0, 0.5, 1.0].into_iter().map(shot).collect()
             }
             Sheet::Realtime => Vec::new(),
+        }
+    }
+
+    /// How many pictures a sheet has drawn for it.
+    fn count(&self, sheet: Sheet) -> usize {
+        match sheet {
+            // Two of the reference, and three in real time.
+            Sheet::Realtime => 5,
+            other => self.shots(other).len(),
         }
     }
 

@@ -109,9 +109,11 @@ impl Place {
         let models: Vec<PathBuf> = files.iter().filter(is_model).cloned().collect();
         match models.as_slice() {
             [model] => Ok(Place::File(model.clone())),
-            [] if sidecars.is_empty() => Err(complain(
-                &"no .glb, .gltf or .obj file in this folder, and no textures that `kinran bake` wrote with their .kinran.json; name a model, or bake one",
-            )),
+            [] if sidecars.is_empty() => Err(complain(&format!(
+                "no .glb, .gltf or .obj file in this folder, and no textures that `kinran bake` wrote with their \
+                 .kinran.json; name a model, or bake one; maps become textures by `kinran bake {}`",
+                path.display()
+            ))),
             [] => Ok(Place::Textures(path.into(), sidecars)),
             models @ [first, ..] => Err(complain(&format!(
                 "{} models in this folder; name one, such as {}",

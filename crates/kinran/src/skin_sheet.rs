@@ -28,7 +28,7 @@ use crate::skin::{SIZE, profile, skin_table};
 use crate::skin_lut::plot::plot;
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::values::{number, vector};
-use crate::view::{View, ViewArgs, file_name};
+use crate::view::{View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, outputs};
 
 /// Draws a model as skin, a sheet of pictures for each choice
@@ -190,16 +190,17 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if !args.whole && args.crop.is_none() && args.view.camera.is_none() && args.view.distance == 1.0 {
         approach(&mut view, &prepared);
     }
+    let pictures = sheets.iter().map(|&sheet| count(sheet)).sum::<u64>();
+    let all = progress.stage("sheets", pictures * samples_of(args.view.size, args.spp));
+    let progress = progress.overall(&all);
     let studio = Studio { args, scene: &scene, prepared, view, progress: &progress };
 
     std::fs::create_dir_all(&output).map_err(|e| kinran_image::Error::io(&output, e))?;
-    let all = progress.stage("sheets", sheets.len() as u64);
     let mut files = Vec::new();
     for &sheet in sheets {
         let name = sheet_file(sheet);
         studio.sheet(sheet)?.write(&output.join(&name))?;
         files.push(name);
-        all.add(1);
     }
     drop(all);
     let text = format!("{} sheets of {} are in {}", files.len(), file_name(&args.file), output.display());
@@ -266,6 +267,17 @@ fn approach(view: &mut View, scene: &RenderScene) {
     let middle = eye - depth * back + depth * tangent * (x * aspect * right + y * up);
     camera.transform.translation = (middle + SHARE * depth * back).into();
     view.middle = middle;
+}
+
+/// How many pictures a sheet has drawn for it, with samples.
+fn count(sheet: Sheet) -> u64 {
+    match sheet {
+        Sheet::Turn => 3 * TURN.len() as u64,
+        Sheet::Curvature => 1,
+        Sheet::Profiles => 4,
+        Sheet::Shadows | Sheet::Normals => 3,
+        Sheet::Tensors => 0,
+    }
 }
 
 /// The name of a sheet's picture.
@@ -669,21 +681,24 @@ impl Studio<'_> {
     }
 }
 
-/// Differences of pictures, all enlarged so many times: by the power of two at which the largest one but a few is not yet white.
+/// Differences of pictures in false colour, the largest of each pixel's channels, all enlarged so many times: by the power of
+/// two at which the largest ones but a few are not yet white.
 fn enlarged_differences(a: &[Picture], b: &[Picture]) -> (Vec<Picture>, u32) {
-    let apart = |a: &Picture, b: &Picture| -> Vec<Color> {
-        a.pixels.iter().zip(&b.pixels).map(|(a, b)| [0, 1, 2].map(|c| a[c].abs_diff(b[c]))).collect()
+    let largest = |a: &Color, b: &Color| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
+    let apart = |a: &Picture, b: &Picture| -> Vec<u8> {
+        a.pixels.iter().zip(&b.pixels).map(|(a, b)| largest(a, b)).collect()
     };
-    let apart: Vec<Vec<Color>> = a.iter().zip(b).map(|(a, b)| apart(a, b)).collect();
-    let mut largest: Vec<u8> = apart.iter().flatten().map(|c| c[0].max(c[1]).max(c[2])).collect();
-    largest.sort_unstable();
-    let most = u32::from(largest.get(largest.len() * 998 / 1000).copied().unwrap_or(255)).max(1);
+    let apart: Vec<Vec<u8>> = a.iter().zip(b).map(|(a, b)| apart(a, b)).collect();
+    // Most of a sheet is backdrop or flat.
+    let mut seen: Vec<u8> = apart.iter().flatten().copied().filter(|&c| c > 0).collect();
+    seen.sort_unstable();
+    let most = u32::from(seen.get(seen.len() * 99 / 100).copied().unwrap_or(255));
     let gain = [1, 2, 4, 8, 16, 32].into_iter().rev().find(|gain| gain * most <= 255).unwrap_or(1);
-    let enlarge = |c: u8| (u32::from(c) * gain).min(255) as u8;
+    let color = |c: u8| false_color((u32::from(c) * gain) as f32 / 255.0);
     let pictures = a.iter().zip(apart).map(|(a, apart)| Picture {
         width: a.width,
         height: a.height,
-        pixels: apart.into_iter().map(|color| color.map(enlarge)).collect(),
+        pixels: apart.into_iter().map(color).collect(),
     });
     (pictures.collect(), gain)
 }

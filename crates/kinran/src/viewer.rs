@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use crate::model::Place;
 use crate::values::size;
-use crate::view::ViewArgs;
+use crate::view::{EnvironmentChoice, ViewArgs};
 use crate::{Console, Error};
 use app::{App, Outcome};
 use parameters::Parameters;
@@ -75,6 +75,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     }
     // A name that is mistyped is told before a window opens.
     args.file.as_deref().map(Place::of).transpose()?;
+    if let EnvironmentChoice::File(path) = &args.view.env {
+        std::fs::metadata(path).map_err(|e| kinran_image::Error::io(path, e))?;
+    }
     let parameters = match &args.parameters {
         Some(path) => Parameters::load(path)?,
         None => Parameters::from_args(&args.view),
@@ -135,12 +138,11 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         .result(&summary, &format!("{}: the first picture came {seconds:.2} s after reading", path.display()))
 }
 
-/// An error without the place in a crate's source that winit puts before it: "os error at …/mod.rs:786: ".
+/// An error without the place in a crate's source that winit puts before it, "os error at …/mod.rs:786: ", and without
+/// the stop at its end.
 fn without_source(message: &str) -> &str {
-    match message.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")) {
-        Some((_, reason)) => reason,
-        None => message,
-    }
+    let reason = message.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
+    reason.map_or(message, |(_, reason)| reason).trim_end_matches('.')
 }
 
 /// What `--screenshot` took.
@@ -160,7 +162,7 @@ mod tests {
     #[test]
     fn an_error_says_nothing_of_a_crate_s_source() {
         let of_winit =
-            "winit EventLoopError: os error at /root/.cargo/winit-0.30.13/src/linux/mod.rs:786: no display";
+            "winit EventLoopError: os error at /root/.cargo/winit-0.30.13/src/linux/mod.rs:786: no display.";
         assert_eq!(without_source(of_winit), "no display");
         assert_eq!(without_source("no adapter: none"), "no adapter: none");
     }

@@ -32,7 +32,7 @@ use crate::{Console, Error};
 /// twice the target's density, and solved three times: "own" against the tiles it was painted over, as in the talk;
 /// "other" against the one tile of all other materials that is nearest in its colours, which has nothing to do with the
 /// target; "faded" against the same at the largest opacity with which the result is no worse than the compressed target.
-/// Numbers are those of the second mip, as in the talk, and of the first. Aniso maps are made of normals and roughness
+/// Numbers are those at half size, as in the talk, and as authored. Aniso maps are made of normals and roughness
 /// where a material has none.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:

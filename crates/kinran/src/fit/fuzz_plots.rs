@@ -57,7 +57,7 @@ pub(super) fn phase_plots(fit: &FuzzFit) -> String {
     let (width, height) = (4.0 * PANEL, 2.0 * PANEL + 60.0);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
-        font-family=\"sans-serif\" font-size=\"11\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
+        font-family=\"sans-serif\" font-size=\"16\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
     );
     let rows: [(&str, Vec<Panel>, &Phase); 2] = [
         (
@@ -87,7 +87,7 @@ pub(super) fn phase_plots(fit: &FuzzFit) -> String {
                     let v = fibre_direction(case.view, case.azimuth);
                     phase(*case, u, v, fibre_direction(case.tilt, 0.0))
                 });
-                let x = centre.0 - RADIUS + 42.0 * i as f64;
+                let x = centre.0 - RADIUS - 14.0 + 48.0 * i as f64;
                 text(&mut svg, x, top + 12.0 + 2.0 * RADIUS + 32.0, COLORS[i], label);
             }
             marks(&mut svg, centre, &curves);

