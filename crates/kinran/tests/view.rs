@@ -9,6 +9,7 @@
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use kinran_image::{Channels, Image, Pixels, read_image, write_png};
@@ -32,8 +33,12 @@ const PANEL: usize = WIDTH - 370;
 /// How long anything may take: software rendering on a machine that is busy with other tests.
 const PATIENCE: Duration = Duration::from_secs(180);
 
+/// One window at a time: where several are drawn in software, a frame takes longer than a hand holds still.
+static ALONE: Mutex<()> = Mutex::new(());
+
 /// A display without a screen.
 struct Display {
+    _alone: MutexGuard<'static, ()>,
     server: Child,
     name: String,
     /// The server keeps the screen's pixels in a file there.
@@ -58,6 +63,7 @@ impl Display {
             eprintln!("SKIPPED: there is no Xvfb or no xdotool; apt install xvfb xdotool");
             return None;
         }
+        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = tempfile::tempdir().unwrap();
         let mut server = Command::new("Xvfb")
             .args(["-displayfd", "1", "-nolisten", "tcp", "-fbdir", text(folder.path())])
@@ -68,7 +74,7 @@ impl Display {
             .unwrap();
         let mut number = String::new();
         BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
-        Some(Display { server, name: format!(":{}", number.trim()), folder })
+        Some(Display { _alone: alone, server, name: format!(":{}", number.trim()), folder })
     }
 
     /// The screen's pixels, from the X window dump that the server keeps.
