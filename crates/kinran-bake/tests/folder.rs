@@ -1211,7 +1211,8 @@ fn linear_colour_is_taken_as_srgb() {
         let texel = |material: LoadedMaterial| {
             let map = &material.images[0];
             let encoding = Encoding { format: Format::Rgba8, ..Role::Color.encoding() };
-            let texture = bake_plain(&map.image, Transfer::Srgb, encoding, Kernel::Box, hints.wrap, &|_| {}).unwrap();
+            let texture =
+                bake_plain(&map.image, Transfer::Srgb, encoding, Kernel::Box, hints.wrap, &|_| {}).unwrap();
             let data = &texture.levels[0].data;
             (material.name, [data[0], data[1], data[2]], map.remarks.join("; "))
         };

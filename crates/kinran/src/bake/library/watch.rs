@@ -62,14 +62,20 @@ pub(super) fn watch(args: &Args, console: &Console) -> Result<(), Error> {
     }
 }
 
-/// Folders to watch, absolute, and whether what is below them matters too.
-struct Folders(BTreeMap<PathBuf, bool>);
+struct Folders {
+    /// Folders to watch, absolute, and whether what is below them matters too.
+    watched: BTreeMap<PathBuf, bool>,
+    /// Of folders that are watched for the sake of something in them alone, what that is.
+    ways: BTreeMap<PathBuf, BTreeSet<PathBuf>>,
+}
 
 impl Folders {
     fn covers(&self, others: &BTreeSet<PathBuf>) -> bool {
         others.iter().all(|folder| {
             let full = absolute(folder);
-            self.0.contains_key(&full) || full.ancestors().any(|above| self.0.get(above) == Some(&true))
+            let deep = |above: &Path| self.watched.get(above) == Some(&true);
+            let is_way = self.ways.contains_key(&full);
+            (self.watched.contains_key(&full) && !is_way) || full.ancestors().any(deep)
         })
     }
 }
@@ -88,20 +94,26 @@ fn folders(args: &Args, inputs: &BTreeSet<PathBuf>) -> Folders {
     }
 
     let mut folders: BTreeMap<PathBuf, bool> = BTreeMap::new();
+    let mut ways: BTreeMap<PathBuf, BTreeSet<PathBuf>> = BTreeMap::new();
+    let wanted_fully: BTreeSet<PathBuf> = wanted.keys().map(|folder| absolute(folder)).collect();
     for (folder, deep) in wanted {
         let full = absolute(&folder);
         if full.is_dir() {
             *folders.entry(full.clone()).or_default() |= deep;
         }
         // In case that it is removed, renamed, or made.
-        if let Some(above) = full.ancestors().skip(1).find(|above| above.is_dir()) {
+        let mut steps = full.ancestors().zip(full.ancestors().skip(1));
+        if let Some((way, above)) = steps.find(|(_, above)| above.is_dir()) {
             folders.entry(above.to_path_buf()).or_default();
+            ways.entry(above.to_path_buf()).or_default().insert(way.to_path_buf());
         }
     }
+    ways.retain(|above, _| !wanted_fully.contains(above));
     // What is watched with all that is below need not be watched again.
     let deep: BTreeSet<PathBuf> = folders.iter().filter(|(_, deep)| **deep).map(|(f, _)| f.clone()).collect();
     folders.retain(|folder, _| !folder.ancestors().skip(1).any(|above| deep.contains(above)));
-    Folders(folders)
+    ways.retain(|above, _| folders.contains_key(above));
+    Folders { watched: folders, ways }
 }
 
 /// The output and the cache, in which the program itself writes.
@@ -123,15 +135,15 @@ struct Watches {
 
 impl Watches {
     fn new(folders: &Folders, ours: &Arc<Vec<PathBuf>>, tell: &Sender<()>) -> Watches {
-        let (ours, tell) = (ours.clone(), tell.clone());
+        let (ours, tell, ways) = (ours.clone(), tell.clone(), folders.ways.clone());
         let handler = move |event: notify::Result<Event>| {
-            if event.as_ref().map_or(true, |event| matters(event, &ours)) {
+            if event.as_ref().map_or(true, |event| matters(event, &ours, &ways)) {
                 // Nobody is left to tell at the very end.
                 let _ = tell.send(());
             }
         };
         let watcher = notify::recommended_watcher(handler).and_then(|mut watcher| {
-            for (folder, deep) in &folders.0 {
+            for (folder, deep) in &folders.watched {
                 let mode = if *deep { RecursiveMode::Recursive } else { RecursiveMode::NonRecursive };
                 match watcher.watch(folder, mode) {
                     // Gone since it was listed: its parent tells when it comes back.
@@ -159,7 +171,7 @@ impl Watches {
 
     fn describe(&self, manifest: &Path, folders: &Folders) -> String {
         let here = absolute(Path::new(""));
-        let names: Vec<String> = (folders.0.iter())
+        let names: Vec<String> = (folders.watched.iter())
             .map(|(folder, deep)| {
                 let short = folder.strip_prefix(&here).unwrap_or(folder);
                 let name =
@@ -181,7 +193,7 @@ impl Watches {
 }
 
 /// Whether an event may change what is baked.
-fn matters(event: &Event, ours: &[PathBuf]) -> bool {
+fn matters(event: &Event, ours: &[PathBuf], ways: &BTreeMap<PathBuf, BTreeSet<PathBuf>>) -> bool {
     let is_read = match event.kind {
         EventKind::Access(AccessKind::Close(AccessMode::Write)) => false,
         EventKind::Access(_) => true,
@@ -191,6 +203,10 @@ fn matters(event: &Event, ours: &[PathBuf]) -> bool {
         ours.iter().any(|folder| path.starts_with(folder))
             || path.components().any(|c| c.as_os_str() == STATE)
     };
+    // A neighbour of what matters.
+    let is_beside = |path: &PathBuf| {
+        path.parent().and_then(|above| ways.get(above)).is_some_and(|ways| !ways.contains(path))
+    };
     // An event without paths says that some were lost.
-    !is_read && (event.paths.is_empty() || !event.paths.iter().all(is_ours))
+    !is_read && (event.paths.is_empty() || !event.paths.iter().all(|path| is_ours(path) || is_beside(path)))
 }
