@@ -153,6 +153,7 @@ mod tests {
             ("zstd", "9"),
             ("direction-span", "180"),
             ("map", "normal=a.png"),
+            ("exr-layer", "a.exr=View.Normal"),
             ("roughness", "0.25"),
             ("anisotropy", "0.25"),
             ("curvature-range", "1"),
