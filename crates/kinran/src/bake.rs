@@ -68,7 +68,7 @@ pub struct Args {
     #[arg(long, short, value_name = "DIR")]
     pub output: Option<PathBuf>,
 
-    /// How a footprint becomes one texel: ml, linear (the talk), param, lean or naive
+    /// How a footprint becomes one texel: ml, dpd, linear (the talk), param, lean or naive
     #[arg(long, value_name = "NAME", default_value = "ml", value_parser = filter)]
     pub filter: Filter,
 

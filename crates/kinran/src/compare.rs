@@ -47,7 +47,7 @@ pub struct Args {
     #[arg(long, short, value_name = "DIR")]
     pub output: Option<PathBuf>,
 
-    /// Filters, in the order of the columns: ml, linear, param, lean, naive
+    /// Filters, in the order of the columns: ml, dpd, linear, param, lean, naive
     #[arg(long, value_name = "A,B,C", value_delimiter = ',', default_value = "ml,linear,lean,naive",
         value_parser = filter)]
     pub filters: Vec<Filter>,

@@ -51,6 +51,7 @@ fn description(name: &str) -> &'static str {
     match name {
         "truth" => "ground truth",
         "ml" => "most likely GGX",
+        "dpd" => "GGX of least divergence",
         "linear" => "mean of SGGX matrices",
         "param" => "SGGX parameters",
         "lean" => "LEAN mapping",

@@ -57,7 +57,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub spp: u32,
 
-    /// Which mips are baked before rendering: ml, linear, param, lean or naive; none samples level 0
+    /// Which mips are baked before rendering: ml, dpd, linear, param, lean or naive; none samples level 0
     /// alone, uncompressed, which with many samples in a pixel is ground truth; baked takes those of the model's own
     /// KTX2 or DDS files. The default is baked where there are such files, else ml
     #[arg(long, value_name = "NAME", value_parser = mips)]

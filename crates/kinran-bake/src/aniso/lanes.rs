@@ -37,9 +37,10 @@ impl F8 {
         F8(from_fn(|l| if self.0[l] < o.0[l] { self.0[l] } else { o.0[l] }))
     }
 
+    /// The larger in each lane.
     #[inline(always)]
-    pub(crate) fn abs(self) -> Self {
-        self.map(f32::abs)
+    pub(crate) fn max_of(self, o: Self) -> Self {
+        F8(from_fn(|l| if self.0[l] > o.0[l] { self.0[l] } else { o.0[l] }))
     }
 
     #[inline(always)]

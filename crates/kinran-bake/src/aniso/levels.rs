@@ -11,7 +11,7 @@ use kinran_shading::Sym2;
 use super::footprint::{Kernel, Taps, footprints};
 use super::maps::{SurfaceMaps, TexelSpan, clamp_roughness};
 use super::moments::{LeanFilter, LinearFilter, MOMENTS, MomentFilter, NaiveFilter};
-use super::{ml, param};
+use super::{dpd, ml, param};
 use crate::mips::{BAND_ROWS, PlaneBand, PlaneRows, TILE, reduce_levels};
 
 /// How a footprint of level 0 becomes one texel.
@@ -20,6 +20,8 @@ pub enum Filter {
     /// Maximum-likelihood GGX: the single lobe under which the footprint's microfacets are most probable.
     #[default]
     Ml,
+    /// The GGX lobe of least density power divergence from the footprint's microfacets, β = 1/4.
+    Dpd,
     /// Average of SGGX matrices (the talk).
     Linear,
     /// SGGX parameter estimation (Heitz et al. 2015, section 4).
@@ -32,11 +34,13 @@ pub enum Filter {
 
 impl Filter {
     /// All filters, best first.
-    pub const ALL: [Filter; 5] = [Filter::Ml, Filter::Linear, Filter::Param, Filter::Lean, Filter::Naive];
+    pub const ALL: [Filter; 6] =
+        [Filter::Dpd, Filter::Ml, Filter::Linear, Filter::Param, Filter::Lean, Filter::Naive];
 
     /// The name on the command line and in metadata.
     pub fn name(self) -> &'static str {
         match self {
+            Filter::Dpd => "dpd",
             Filter::Ml => "ml",
             Filter::Linear => "linear",
             Filter::Param => "param",
@@ -89,6 +93,7 @@ pub fn coarser_levels<T: Send>(
         Filter::Linear => moment_levels::<LinearFilter, T>(maps, kernel, &consume),
         Filter::Lean => moment_levels::<LeanFilter, T>(maps, kernel, &consume),
         Filter::Naive => moment_levels::<NaiveFilter, T>(maps, kernel, &consume),
+        Filter::Dpd => footprint_levels(maps, kernel, dpd::fit_band, &consume),
         Filter::Ml => footprint_levels(maps, kernel, ml::fit_band, &consume),
         Filter::Param => footprint_levels(maps, kernel, param::fit_band, &consume),
     }

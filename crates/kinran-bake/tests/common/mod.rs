@@ -92,22 +92,34 @@ pub fn lobe((n, a): Surface, u: Vec3, v: Vec3) -> f32 {
     ggx_matrix_d(h, a) * smith_matrix_v(u, v, a) * u.z
 }
 
-/// Relative L2 error of the shaded lobe against the mean of the footprint's, over six views and all lights.
+/// Relative errors of the shaded lobe against the mean of the footprint's, over six views and all lights.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ShadedError {
+    pub l2: f32,
+    pub l1: f32,
+}
+
+/// Relative L2 error of the shaded lobe, see [`shaded_errors`].
 pub fn shaded_l2(footprint: &[Surface], fit: Surface) -> f32 {
-    const RINGS: usize = 64;
-    const SECTORS: usize = 128;
-    let (mut error, mut norm) = (0.0_f64, 0.0_f64);
+    shaded_errors(footprint, &[fit], 64)[0].l2
+}
+
+/// Errors of some fits, by half vectors on so many rings and twice as many sectors.
+pub fn shaded_errors(footprint: &[Surface], fits: &[Surface], rings: usize) -> Vec<ShadedError> {
+    let sectors = 2 * rings;
+    let mut sums = vec![[0.0_f64; 2]; fits.len()];
+    let mut norms = [0.0_f64; 2];
     for (theta, phi) in [(0.0, 0.0), (30.0, 0.0), (30.0, 120.0), (30.0, 240.0), (60.0, 45.0), (60.0, 225.0)] {
         let (theta, phi) = (f32::to_radians(theta), f32::to_radians(phi));
         let v = vec3(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
         // Half vectors on rings of slopes r = tan θ that crowd where lobes are narrow; each carries the solid
         // angle of its light direction.
-        for ring in 0..RINGS {
-            let t = (ring as f32 + 0.5) / RINGS as f32;
+        for ring in 0..rings {
+            let t = (ring as f32 + 0.5) / rings as f32;
             let slope = 0.25 * t / (1.0 - t);
-            let slope_step = 0.25 / ((1.0 - t) * (1.0 - t)) / RINGS as f32;
-            for sector in 0..SECTORS {
-                let phi = 2.0 * PI * (sector as f32 + 0.5) / SECTORS as f32;
+            let slope_step = 0.25 / ((1.0 - t) * (1.0 - t)) / rings as f32;
+            for sector in 0..sectors {
+                let phi = 2.0 * PI * (sector as f32 + 0.5) / sectors as f32;
                 let h = vec3(slope * phi.cos(), slope * phi.sin(), 1.0).normalize();
                 let v_h = v.dot(h);
                 let u = h * (2.0 * v_h) - v;
@@ -115,13 +127,49 @@ pub fn shaded_l2(footprint: &[Surface], fit: Surface) -> f32 {
                     continue;
                 }
                 // dω_h = z³ r dr dφ, dω_u = 4 v·h dω_h.
-                let solid_angle = 4.0 * v_h * h.z.powi(3) * slope * slope_step * 2.0 * PI / SECTORS as f32;
+                let solid_angle = 4.0 * v_h * h.z.powi(3) * slope * slope_step * 2.0 * PI / sectors as f32;
                 let truth = footprint.iter().map(|t| lobe(*t, u, v)).sum::<f32>() / footprint.len() as f32;
-                let difference = lobe(fit, u, v) - truth;
-                error += f64::from(difference * difference * solid_angle);
-                norm += f64::from(truth * truth * solid_angle);
+                let add = |sums: &mut [f64; 2], radiance: f32| {
+                    sums[0] += f64::from(radiance * radiance * solid_angle);
+                    sums[1] += f64::from(radiance.abs() * solid_angle);
+                };
+                add(&mut norms, truth);
+                sums.iter_mut().zip(fits).for_each(|(sums, fit)| add(sums, lobe(*fit, u, v) - truth));
             }
         }
     }
-    (error / norm).sqrt() as f32
+    let relative = |sums: [f64; 2]| ShadedError {
+        l2: (sums[0] / norms[0]).sqrt() as f32,
+        l1: (sums[1] / norms[1]) as f32,
+    };
+    sums.into_iter().map(relative).collect()
+}
+
+/// Half the integral of the absolute difference between the visible microfacets of the footprint and of some fits: 0 where
+/// they agree, 1 where they share none.
+pub fn total_variations(footprint: &[Surface], fits: &[Surface]) -> Vec<f32> {
+    const RINGS: usize = 128;
+    const SECTORS: usize = 256;
+    let density = |(n, a): Surface, h: Vec3| {
+        let m = m_n(n);
+        let local = vec3(m.x_axis.dot(h), m.y_axis.dot(h), n.dot(h));
+        if local.z > 0.0 { ggx_matrix_d(local, a + Sym2::scalar(1e-9)) } else { 0.0 }
+    };
+    let mut sums = vec![0.0_f64; fits.len()];
+    for ring in 0..RINGS {
+        let t = (ring as f32 + 0.5) / RINGS as f32;
+        let slope = 0.25 * t / (1.0 - t);
+        let step = 0.25 / ((1.0 - t) * (1.0 - t)) / RINGS as f32;
+        for sector in 0..SECTORS {
+            let phi = 2.0 * PI * (sector as f32 + 0.5) / SECTORS as f32;
+            let h = vec3(slope * phi.cos(), slope * phi.sin(), 1.0).normalize();
+            // Projected solid angle, z⁴ r dr dφ.
+            let area = h.z.powi(4) * slope * step * 2.0 * PI / SECTORS as f32;
+            let truth = footprint.iter().map(|t| density(*t, h)).sum::<f32>() / footprint.len() as f32;
+            for (sum, fit) in sums.iter_mut().zip(fits) {
+                *sum += f64::from(0.5 * (density(*fit, h) - truth).abs() * area);
+            }
+        }
+    }
+    sums.into_iter().map(|sum| sum as f32).collect()
 }

@@ -39,14 +39,15 @@ pub(super) const CURVATURES: [(&str, SkinCurvature); 4] = [
     ("normalised", SkinCurvature::Normalized),
 ];
 
-/// Names and meanings of the ways to filter.
-pub(super) const METHODS: [(&str, Mips); 6] = [
+/// Names and meanings of the ways to filter. New ones come last: saved parameters hold places in this list.
+pub(super) const METHODS: [(&str, Mips); 7] = [
     ("ml", Mips::Filtered(Filter::Ml)),
     ("linear", Mips::Filtered(Filter::Linear)),
     ("lean", Mips::Filtered(Filter::Lean)),
     ("naive", Mips::Filtered(Filter::Naive)),
     ("ground truth", Mips::Level0),
     ("as baked", Mips::Baked),
+    ("dpd", Mips::Filtered(Filter::Dpd)),
 ];
 
 /// A material as the sliders have it; factors multiply its textures.
@@ -295,7 +296,7 @@ impl Parameters {
         let parameters: Self = serde_json::from_str(&text)
             .map_err(|e| complain(format!("{e}; save the parameters again in the window")))?;
         let checks = [
-            ("methods", parameters.methods.iter().all(|&m| m < METHODS.len()), "two numbers from 0 to 5"),
+            ("methods", parameters.methods.iter().all(|&m| m < METHODS.len()), "two numbers from 0 to 6"),
             ("channel", parameters.channel < CHANNELS.len(), "a number from 0 to 6"),
             ("split_at", (0.0..=1.0).contains(&parameters.split_at), "a number from 0 to 1"),
             ("tonemap", ["aces", "agx", "none"].contains(&parameters.tonemap.as_str()), "aces, agx or none"),
