@@ -209,7 +209,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if let Some(warning) = check_space(&args.output(), needed)? {
         console.warn(warning);
     }
-    std::fs::create_dir_all(&args.output()).map_err(|e| kinran_image::Error::io(&args.output(), e))?;
+    std::fs::create_dir_all(args.output()).map_err(|e| kinran_image::Error::io(args.output(), e))?;
 
     let (width, height) = (args.size.0 as usize, args.size.1 as usize);
     let range = f64::from(args.range);

@@ -473,7 +473,7 @@ fn write_textures(
     solved: &Solved,
     tiles: &Tiles,
 ) -> Result<Vec<String>, Error> {
-    std::fs::create_dir_all(&args.output()).map_err(|e| kinran_image::Error::io(&args.output(), e))?;
+    std::fs::create_dir_all(args.output()).map_err(|e| kinran_image::Error::io(args.output(), e))?;
     let mut files = Vec::new();
     let mut write = |name: String, texture: &kinran_image::Texture, map: Content| -> Result<(), Error> {
         let mut texture = texture.clone();
