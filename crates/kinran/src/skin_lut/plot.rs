@@ -17,7 +17,7 @@ const TOP: u32 = 84;
 
 /// The punctual table as it looks, cuts through it at three curvatures, and the ambient factors.
 pub(crate) fn plot(title: &str, punctual: &Table, ambient: &Table, range: f32) -> Picture {
-    let mut picture = Picture::new(3 * (SIDE + MARGIN) + MARGIN / 2, TOP + SIDE + 74, PAPER);
+    let mut picture = Picture::new(3 * (SIDE + MARGIN) + MARGIN / 2, TOP + SIDE + 98, PAPER);
     picture.text((MARGIN, 32), 26.0, INK, title);
     let left = |panel: u32| MARGIN + panel * (SIDE + MARGIN);
     let curvatures = [0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (t, format!("{:.3}", t * range)));
@@ -92,7 +92,8 @@ fn axes(
         let x = left - 8 - 11 * label.chars().count() as u32;
         picture.text((x, y as u32), 17.0, FAINT, label);
     }
-    picture.text((left, TOP + SIDE + 56), 19.0, INK, &format!("across: {x_name}   up: {y_name}"));
+    picture.text((left, TOP + SIDE + 56), 19.0, INK, &format!("across: {x_name}"));
+    picture.text((left, TOP + SIDE + 80), 19.0, INK, &format!("up: {y_name}"));
 }
 
 /// A curve of values from 0 to 1, two pixels wide, as coverage by vertical distance over the slope.
