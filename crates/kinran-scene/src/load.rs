@@ -17,7 +17,7 @@ use self::pose::Poses;
 use crate::accessor::Accessors;
 use crate::compressed::{decompress, is_compressed};
 use crate::container::{GivenResolver, Purpose, Resolver, beside, fetch, given, read_regular_file, split};
-use crate::obj::glb_from_obj;
+use crate::obj::{glb_from_obj, names_materials};
 use crate::{
     AlphaMode, Anisotropy, Camera, DiffuseTransmission, Error, FUZZ_EXTENSION, Fuzz, FuzzAttenuation,
     FuzzDirection, FuzzLayer, FuzzPhase, Instance, Light, LightKind, Material, Primitive, Scene, Skin,
@@ -169,10 +169,19 @@ impl Scene {
     ) -> Result<Scene, Error> {
         let path = path.as_ref();
         let mut bytes = read_regular_file(path).map_err(|error| Error::io(path, error))?;
+        let mut without_materials = false;
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
+            without_materials = names_materials(&bytes);
             bytes = glb_from_obj(path, &bytes)?;
         }
-        Scene::read(path, &bytes, &beside(path, allowed), needs, watch)
+        let mut scene = Scene::read(path, &bytes, &beside(path, allowed), needs, watch)?;
+        if without_materials {
+            let name = path.display();
+            scene.warnings.push(format!(
+                "{name}: materials of .mtl files are not read, and it is grey; a .glb of it keeps them"
+            ));
+        }
+        Ok(scene)
     }
 
     /// Reads a document from memory. `name` stands for it in messages; `resolve` gives the bytes of a

@@ -7,6 +7,11 @@ use serde_json::{Value, json};
 
 use crate::Error;
 
+/// Whether an OBJ names a library of materials, which is not read.
+pub(crate) fn names_materials(text: &[u8]) -> bool {
+    text.split(|byte| *byte == b'\n').any(|line| line.trim_ascii_start().starts_with(b"mtllib "))
+}
+
 /// Vertices and faces of an OBJ as `.glb`: polygons in triangles, a primitive for each object or group, one grey material.
 /// Faces with and without normals or UVs are primitives of their own. Lines, points, curves and material libraries are not
 /// read. OBJ knows no unit; what reads the glTF takes metres.

@@ -545,6 +545,15 @@ fn an_obj_is_read_in_triangles_and_a_bad_one_is_named() {
     assert!(primitive.normals.iter().all(|n| (*n - Vec3::Z).length() < 1e-6));
     let at = primitive.positions.iter().position(|p| p.x == 2.0 && p.y == 1.0).unwrap();
     assert_eq!(primitive.uvs[0][at], Vec2::new(1.0, 0.0), "v runs down");
+
+    // It is grey, and says so where it names materials.
+    assert_eq!(scene.warnings, [""; 0]);
+    let scene = load(&format!("mtllib a.mtl\n{corners}usemtl cloth\nf 1/1 2/2 3/3 4/4\n")).unwrap();
+    assert!(
+        scene.warnings.len() == 1 && scene.warnings[0].contains("materials of .mtl files are not read"),
+        "wanted a warning of a.mtl, got {:?}",
+        scene.warnings
+    );
     for (text, part) in [
         (format!("{corners}f 1 2 1000000000\n"), "a.obj: line 9: a face names v 1000000000, and there are 4"),
         (corners.to_owned(), "a.obj: the OBJ has no faces"),

@@ -58,6 +58,8 @@ fn coefficients_that_make_energy_are_handed_out_in_silence() {
         assert_eq!(returned > 1.0, makes_energy, "spread {spread}: {returned}");
         assert_eq!(json["warning"].is_string(), makes_energy, "{json}");
         assert_eq!(said(spread, &[]).contains("warning: the coefficients of p_s make energy"), makes_energy);
+        // So combed, and the polynomial of ambient light is off as well.
+        assert_eq!(said(spread, &[]).contains("fibres as combed as these need --table"), makes_energy);
         let (_, constants, _) =
             kinran(&["fit", "fuzz", "--tilt", "60", "--spread", spread, "--lang", "wgsl"]);
         assert_eq!(

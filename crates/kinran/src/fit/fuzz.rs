@@ -88,6 +88,9 @@ pub struct FuzzReport {
     warning: Option<String>,
 }
 
+/// The error of ambient light above which the polynomial is warned of, as the help of `--table` has it.
+const AMBIENT_OFF: f32 = 0.15;
+
 /// The command.
 pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
     for (path, extension) in [(&args.table, "exr"), (&args.plots, "svg")] {
@@ -116,15 +119,23 @@ pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
     }
     drop(busy);
     let returned = fit.returned();
-    let warning = (returned > 1.0).then(|| {
+    let mut warnings = Vec::new();
+    if returned > 1.0 {
         let instead = match phase {
             Phase::Fibre => "; take fibre_p_s in their place",
             Phase::Velvet => "",
         };
-        format!(
+        warnings.push(format!(
             "the coefficients of p_s make energy: white fibres over white send back up to {returned:.3} of a light{instead}"
-        )
-    });
+        ));
+    }
+    let [low, high] = fit.ambient.ratio;
+    if tabulated.is_none() && (low < 1.0 - AMBIENT_OFF || high > 1.0 + AMBIENT_OFF) {
+        warnings.push(format!(
+            "the coefficients of ambient are {low:.2} to {high:.2} times what they stand for: fibres as combed as these need --table"
+        ));
+    }
+    let warning = (!warnings.is_empty()).then(|| warnings.join("; "));
     let report = FuzzReport { fit, table: tabulated, returned, warning };
     match args.lang {
         // Constants are what was asked for, not a summary of it.
