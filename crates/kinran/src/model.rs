@@ -1,5 +1,6 @@
 //! What a path shows: a glTF file, a folder that holds one, or a folder of baked textures.
 
+use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -132,7 +133,9 @@ impl Model {
     pub fn open(path: &Path, args: &ModelArgs, progress: &Progress) -> Result<Self, Error> {
         match Place::of(path)? {
             Place::File(path) => {
-                let scene = read_scene(&path, args, &Needs::ALL, progress)?;
+                let mut scene = read_scene(&path, args, &Needs::ALL, progress)?;
+                let not_drawn = not_drawn(&scene);
+                scene.warnings.extend(not_drawn);
                 Ok(Model { path, scene, only_baked: false })
             }
             Place::Textures(path, sidecars) => {
@@ -141,6 +144,22 @@ impl Model {
             }
         }
     }
+}
+
+/// What materials have and no picture shows, a sentence for each extension.
+fn not_drawn(scene: &Scene) -> Vec<String> {
+    let mut materials: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for material in &scene.materials {
+        for extension in &material.ignored_extensions {
+            materials.entry(extension).or_default().push(&material.name);
+        }
+    }
+    let sentence = |(extension, names): (&str, Vec<&str>)| match names[..] {
+        [name] => format!("material \"{name}\": {extension} is not drawn"),
+        [name, ..] => format!("material \"{name}\" and {} more: {extension} is not drawn", names.len() - 1),
+        [] => String::new(),
+    };
+    materials.into_iter().map(sentence).collect()
 }
 
 /// Reads a model with a bar.

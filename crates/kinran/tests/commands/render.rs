@@ -3,6 +3,7 @@
 use crate::common::{bumps, files, kinran, kinran_json, refused, square, text};
 use kinran_image::{Channels, Image, Pixels, encode_png, read_image};
 use kinran_render::metrics::{flip, rmse_srgb8};
+use serde_json::json;
 use std::path::Path;
 
 fn pixels(image: &Image) -> Vec<[u8; 3]> {
@@ -311,4 +312,31 @@ fn a_folder_of_baked_textures_is_laid_on_a_board() {
     std::fs::remove_file(baked.join("tin_normal.ktx2")).unwrap();
     refused(&["render", text(&baked), "-o", text(&out)], &["tin_normal.ktx2"]);
     refused(&["render", text(&maps), "-o", text(&out)], &["no .glb", "bake one"]);
+}
+
+/// A clearcoat that no picture shows is told, once for all materials that have one.
+#[test]
+fn what_is_not_drawn_is_left_out_in_silence() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("lacquer.gltf");
+    let lacquer = json!({ "KHR_materials_clearcoat": { "clearcoatFactor": 1 } });
+    let document = json!({
+        "asset": { "version": "2.0" }, "extensionsUsed": ["KHR_materials_clearcoat"],
+        "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+        "materials": [{ "name": "red", "extensions": lacquer }, { "name": "black", "extensions": lacquer }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] }],
+        "accessors": [{
+            "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0],
+        }],
+        "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+        "buffers": [{
+            "byteLength": 36,
+            "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA",
+        }],
+    });
+    std::fs::write(&model, document.to_string()).unwrap();
+    let out = folder.path().join("a.png");
+    let said = kinran(&["render", text(&model), "-o", text(&out), "--size", "16x16", "--spp", "1"]);
+    let wanted = "material \"red\" and 1 more: KHR_materials_clearcoat is not drawn";
+    assert!(said.err.contains(wanted), "wanted {wanted:?}, got {:?}", said.err);
 }
