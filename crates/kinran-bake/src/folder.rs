@@ -1,41 +1,9 @@
 //! A folder of authored maps, understood by the names that exporters give them.
 //!
-//! A name is taken apart at `_`, `-`, `.`, blanks and inner capitals, upper and lower case alike. Words
-//! that only say how the file was saved (`2K`, `1024`, `PNG`, `LOD0`, `16bit`, `map`; behind a role also `final`, `copy`,
-//! `v002`, ` (1)`, `Utility - Raw`) are left out, the words before them are the map's role, and what stands before the
-//! role is the material's name. A file called after its role alone belongs to the folder's material.
-//!
-//! | names, without separators | role | channels | written so by |
-//! |---|---|---|---|
-//! | `normal` `normals` `norm` `nor` `nrm` `normalmap` `nmap` `nml` | `normal`, +Y assumed | RG | glTF, Megascans, 3dtextures.me, 3D-Coat |
-//! | … + `gl` `ogl` `opengl` | `normal`, +Y | RG | ambientCG, Poly Haven, Substance |
-//! | … + `dx` `directx` `d3d` | `normal`, −Y | RG | ambientCG, Poly Haven, Substance |
-//! | `roughness` `rough` `rgh` | `roughness` | R | all |
-//! | `gloss` `glossiness` `glossy` `smoothness` | `gloss` | R, one minus roughness | Megascans, Substance, Poliigon |
-//! | `glossu`, `glossv` (`glossinessu`, …) | `gloss-u`, `gloss-v` | R, along and across the direction | the talk |
-//! | `direction` `flow` `flowmap` `anisodirection` `anisotropydirection` | `direction` | RG a vector; grey an angle, whose span is asked for | Godot, the talk |
-//! | `anisotropyangle` `anisoangle` | `direction-angle` | R, 0 to 1 is a full turn | Substance |
-//! | `anisotropylevel` `anisolevel` | `anisotropy-level` | R, Adobe Standard Material: `alpha_t = min(1, alpha + level⁴)` | Substance |
-//! | `anisotropy` | `anisotropy` | RG direction, B strength | glTF (`KHR_materials_anisotropy`) |
-//! | `aniso` | `aniso` | RGB, an aniso texel | Kinran |
-//! | `albedo` `basecolor` `diffuse` `diff` `color` `col`, `…colour`; `basemap` `maintex` `albedotransparency` | `color` | RGB; sRGB, of EXR, HDR and float TIFF linear | all; Unity |
-//! | `ao` `occ` `occlusion` `ambientocclusion` `mixedao` | `occlusion` | R | all |
-//! | `metallic` `metalness` `metal` | `metallic` | R | all |
-//! | `orm` `arm` `aorm` `occlusionroughnessmetallic` | `orm` | R occlusion, G roughness, B metallic | Unreal, Poly Haven, glTF, Substance |
-//! | `rma` `rmo` `rmao`, `mra` `mro` `mrao` | `rma`, `mra` | in the order of the letters | Unreal |
-//! | `ord` `ordp` `orh` `occlusionroughness`; `roughao`, which is told | `occlusion-roughness` | R occlusion, G roughness | Quixel; Poly Haven |
-//! | `metallicroughness`; `x_metallic-x_roughness` | `metallic-roughness` | G roughness, B metallic | glTF; Blender's exporter |
-//! | `metallicsmoothness` `metallicgloss` | `metallic-smoothness` | R metallic, A gloss | Unity |
-//! | `specularsmoothness` `specularglossiness` | `specular-smoothness` | A gloss | Unity, glTF |
-//! | `maskmap` | `mask-map` | R metallic, G occlusion, A gloss | Unity HDRP |
-//! | `n` `nm`, `r`, `d` `bc` (`a`, `b` behind `T_`), `m`, `o` | `normal`, `roughness`, `color`, `metallic`, `occlusion` | as above; with Unreal's `T_` before, or beside another map of the same material | Unreal, Fab |
-//! | `height` `disp` `displacement` `bump`, `emissive`, `specular` `spec` `refl`, `opacity` `mask` | the same | not used | all |
-//! | `curvature` `thickness` `position` `id` `cavity` `worldspacenormals` `bentnormals` `normalsobject` and the like | `other` | not used | bakers, Megascans |
-//!
-//! Names are read together: a word that every file of a set has behind its role, such as Poliigon's `METALNESS`, is no
-//! role; words behind a role that two files of different roles share name a variant of the material; the number of a UDIM
-//! tile (`Head_Normal.1001`) makes a material of each tile. Two files for one map are compared when they are read, and
-//! normal maps with green up and down told apart by their slopes ([`Twin`]).
+//! `docs/folders.md` has the rules and every name. Names are read together: a word that every file of a set has behind its
+//! role, such as Poliigon's `METALNESS`, is no role; words behind a role that two files of different roles share name a
+//! variant of the material; the number of a UDIM tile (`Head_Normal.1001`) makes a material of each tile. Two files for
+//! one map are compared when they are read, and normal maps with green up and down told apart by their slopes ([`Twin`]).
 //!
 //! Nothing is guessed in silence. What can be read in two ways is a [`FolderError`] that names the files and
 //! the flag that settles it; what is assumed stands in the table ([`Folder::table`]), and every file has a row there.
@@ -454,8 +422,32 @@ pub fn scan(folder: &Path, hints: &Hints) -> Result<Folder, FolderError> {
         seen.sort();
         return Err(FolderError::NoMaps { folder: folder.into(), seen });
     }
+    warn_of_tiles(&mut result.materials);
     name_layers(folder, hints, &mut result.materials)?;
     Ok(result)
+}
+
+/// Warns of materials that are another one's tiles by their names: files with the number of a tile beside files without.
+fn warn_of_tiles(materials: &mut [MaterialMaps]) {
+    let files = |material: &MaterialMaps| material.files.iter().map(|(_, file)| file_name(file)).collect();
+    let tiles: Vec<(String, String, Vec<String>)> = (materials.iter())
+        .filter_map(|material| {
+            let (stem, tile) = sets::without_tile(&material.name)?;
+            Some((stem.to_lowercase(), tile.to_owned(), files(material)))
+        })
+        .collect();
+    for material in materials {
+        let name = material.name.to_lowercase();
+        let Some((_, tile, of_tile)) = tiles.iter().find(|(stem, ..)| *stem == name) else { continue };
+        let warning = format!(
+            "{}: {} without the number of a tile, beside {} of tile {tile} (UDIM); each tile is a material of its own, \
+             and so is what has none; give every file of it a number, or none",
+            material.name,
+            listed(&files(material)),
+            listed(of_tile)
+        );
+        material.warnings.push(warning);
+    }
 }
 
 /// What is assumed of a material that matters and that a flag settles, a sentence each.

@@ -423,6 +423,57 @@ fn sets_as_exporters_name_them_fall_apart_or_together() {
             &["Steel01_METALNESS: normal color", "Steel01_SPECULAR: normal gloss color"],
         ),
         (
+            "Poliigon, some by metalness",
+            &[
+                "Metal01_AO_2K.png",
+                "Metal01_COL_2K_METALNESS.png",
+                "Metal01_METALNESS_2K_METALNESS.png",
+                "Metal01_NRM_2K_METALNESS.png",
+                "Metal01_ROUGHNESS_2K_METALNESS.png",
+            ],
+            &["Metal01: normal roughness color occlusion metallic"],
+        ),
+        (
+            "Poliigon, one by metalness",
+            &["Metal01_COL_VAR1_2K_METALNESS.png", "Metal01_NRM_2K.png", "Metal01_ROUGHNESS_2K.png"],
+            &["Metal01: normal roughness color"],
+        ),
+        (
+            "Poliigon, some by specular",
+            &[
+                "Fabric001_COL_1K_SPECULAR.jpg",
+                "Fabric001_GLOSS_1K_SPECULAR.jpg",
+                "Fabric001_NRM_1K_SPECULAR.jpg",
+                "Fabric001_REFL_1K.jpg",
+            ],
+            &["Fabric001: normal gloss color"],
+        ),
+        (
+            "metalness behind a size, of materials called as roles",
+            &[
+                "Wall_Metal_2K_Metallic.png",
+                "Wall_Metal_2K_Normal.png",
+                "Wall_Rough_2K_Metallic.png",
+                "Wall_Rough_2K_Normal.png",
+            ],
+            &["Wall_Metal: normal metallic", "Wall_Rough: normal metallic"],
+        ),
+        (
+            "Standard Surface",
+            &[
+                "rock_base_color.png",
+                "rock_coat_roughness.png",
+                "rock_normal.png",
+                "rock_specular_roughness.png",
+            ],
+            &["rock: normal roughness color"],
+        ),
+        (
+            "Standard Surface, of what is called specular",
+            &["old_specular_normal.png", "old_specular_roughness.png"],
+            &["old_specular: normal roughness"],
+        ),
+        (
             "Poliigon, by specular",
             &[
                 "Oak01_AO_3K.jpg",
@@ -672,6 +723,30 @@ fn sets_as_exporters_name_them_fall_apart_or_together() {
     for (what, names, wanted) in cases {
         let folder = scanned(names, &Hints::default()).unwrap_or_else(|e| panic!("{what}: {e}"));
         assert_eq!(materials(&folder), *wanted, "{what}:\n{}", folder.table());
+    }
+}
+
+#[test]
+fn a_map_without_the_number_of_a_tile_leaves_its_tiles_in_silence() {
+    for (tiled, plain, wanted) in [
+        ("rock_Normal_1001.png", "rock_roughness.png", Some("of tile 1001")),
+        ("rock.1002_Normal.png", "rock_roughness.png", Some("of tile 1002")),
+        ("rock_Normal_u1_v2.png", "rock_roughness.png", Some("of tile u1_v2")),
+        ("rock_Normal_1001.png", "moss_roughness.png", None),
+        ("rock_Normal_1001.png", "rock_roughness_1001.png", None),
+    ] {
+        let folder = scanned(&[tiled, plain], &Hints::default()).unwrap();
+        let warnings = folder.materials.iter().flat_map(|material| &material.warnings);
+        let about: Vec<&String> = warnings.filter(|warning| warning.contains("tile")).collect();
+        match wanted {
+            None => assert!(about.is_empty(), "{tiled} {plain}: {about:?}"),
+            Some(tile) => {
+                assert_eq!(about.len(), 1, "{tiled} {plain}: {about:?}\n{}", folder.table());
+                for part in [tiled, plain, tile] {
+                    assert!(about[0].contains(part), "{tiled} {plain}: no {part} in {about:?}");
+                }
+            }
+        }
     }
 }
 

@@ -37,10 +37,10 @@ pub use report::{Input, Output, Report, SurfaceReport};
 
 /// Bakes a folder of authored maps, a glTF file or a whole library into textures with right mips
 ///
-/// A folder: maps are found by the names that Substance, ambientCG, Poly Haven, Quixel and glTF exporters give
-/// them; what was understood is printed as a table, and what is ambiguous is an error that names the flag
-/// which settles it. Each material becomes NAME_normal and NAME_aniso (and NAME_color, NAME_orm where there
-/// are such maps), and NAME.kinran.json, which says how they were made and what was lost on each level.
+/// A folder: maps are found by the names that Substance, ambientCG, Poly Haven, Quixel and glTF exporters give them
+/// (docs/folders.md lists them); what was understood is printed as a table, and what is ambiguous is an error that
+/// names the flag which settles it. Each material becomes NAME_normal and NAME_aniso (and NAME_color, NAME_orm
+/// where there are such maps), and NAME.kinran.json, which says how they were made and what was lost on each level.
 ///
 /// A .glb or .gltf: every material with a normal, roughness or anisotropy map gets normal, roughness and anisotropy
 /// textures whose every level is right, in glTF's own terms; the model is written beside them.
@@ -156,7 +156,7 @@ pub struct Args {
     #[arg(long)]
     pub dry_run: bool,
 
-    /// Overwrites files that kinran did not write, or that were changed since
+    /// Overwrites files that kinran did not write, that were changed since, or that come from another input
     #[arg(long)]
     pub force: bool,
     /// Of a folder's normal maps, take z from blue as glTF does, instead of rebuilding it from red and green
@@ -182,6 +182,10 @@ pub struct Args {
     /// Flags that only a manifest takes.
     #[command(flatten)]
     pub library: LibraryArgs,
+
+    /// The input is a library's copy, whose place says nothing.
+    #[arg(skip)]
+    pub is_copy: bool,
 }
 
 /// `ROLE=FILE`.

@@ -161,6 +161,7 @@ const REPORTS: [&str; 2] = [".kinran.json", ".detail.json"];
 #[derive(Deserialize)]
 struct KnownFiles {
     written: Vec<WrittenFile>,
+    source: Option<String>,
 }
 
 fn is_report(file: &str) -> bool {
@@ -198,6 +199,48 @@ pub(crate) fn refuse_foreign(folder: &Path, files: &[String], force: bool) -> Re
         }
     }
     Ok(())
+}
+
+/// Refuses to overwrite a report, and with it its files, that was made from something else than `input`: two folders may
+/// have a material of one name.
+///
+/// # Errors
+/// [`Error::File`] with both, unless forced.
+pub(crate) fn refuse_other_source(
+    folder: &Path,
+    files: &[String],
+    input: &Path,
+    force: bool,
+) -> Result<(), Error> {
+    for file in files.iter().filter(|file| is_report(file) && !force) {
+        let path = folder.join(file);
+        let Some(source) = read_report(&path).and_then(|report| report.source) else { continue };
+        if way(folder, input).is_some_and(|way| way != source) {
+            let source = folder.join(source);
+            let reason = format!(
+                "was baked from {}, and what is baked from {} would take its place; name another folder with --output, \
+                 or overwrite it with --force",
+                source.canonicalize().unwrap_or(source).display(),
+                input.display()
+            );
+            return Err(Error::file_error(&path, reason));
+        }
+    }
+    Ok(())
+}
+
+/// The way from a folder to a path, `/`-separated; nothing where there is none, as between two drives.
+pub(crate) fn way(folder: &Path, path: &Path) -> Option<String> {
+    let (folder, path) = (folder.canonicalize().ok()?, path.canonicalize().ok()?);
+    let common = folder.components().zip(path.components()).take_while(|(a, b)| a == b).count();
+    let up = folder.components().skip(common).map(|_| "..".into());
+    let down = path.components().skip(common).map(|part| part.as_os_str().to_string_lossy().into_owned());
+    let parts: Vec<String> = up.chain(down).collect();
+    match (common, parts.is_empty()) {
+        (0, _) => None,
+        (_, true) => Some(".".into()),
+        (_, false) => Some(parts.join("/")),
+    }
 }
 
 /// What the reports in a folder name.
@@ -346,6 +389,16 @@ mod tests {
         assert!(refused(&["a.ktx2"], false).unwrap_err().contains("a.ktx2"));
         write("m.kinran.json", "{ \"notes\": \"mine\" }");
         assert!(refused(&["m.kinran.json"], false).unwrap_err().contains("m.kinran.json"));
+        let other =
+            |named: &str| refuse_other_source(folder.path(), &["m.kinran.json".into()], &path(named), false);
+        for source in ["x", "y"] {
+            std::fs::create_dir(path(source)).unwrap();
+        }
+        write("m.kinran.json", &serde_json::json!({ "written": [], "source": "x" }).to_string());
+        other("x").unwrap();
+        assert!(other("y").unwrap_err().to_string().contains("was baked from"));
+        assert_eq!(way(&path("x"), &path("y")).as_deref(), Some("../y"));
+        assert_eq!(way(&path("x"), &path("x")).as_deref(), Some("."));
         std::fs::create_dir(path("d.ktx2")).unwrap();
         assert!(refused(&["d.ktx2"], true).unwrap_err().contains("is a folder"));
     }

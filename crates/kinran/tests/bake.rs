@@ -297,6 +297,8 @@ fn a_dry_run_writes() {
         let said = kinran(&["bake", text(source), "-o", text(&out), "--dry-run"]);
         assert_eq!(said.code, Some(0), "{}", said.err);
         assert!(!said.out.is_empty());
+        let names_alone = said.out.contains("texels were not looked at");
+        assert_eq!(names_alone, source == input.path(), "{}", said.out);
         assert!(files(parent.path()).is_empty(), "written: {:?}", files(parent.path()));
     }
 }
@@ -497,6 +499,47 @@ fn a_folder_is_baked_from_what_was_baked_into_it() {
     };
     for file in ["cloth_normal.ktx2", "cloth_aniso.dds", "cloth_color.ktx2"] {
         assert_eq!(note(file), "not used: baked by kinran", "{file}");
+    }
+}
+
+/// Two folders, and two models, with a material of one name and one place for what is baked.
+#[test]
+fn a_material_of_another_folder_takes_the_place_of_one() {
+    let parent = tempfile::tempdir().unwrap();
+    let at = |name: &str| parent.path().join(name);
+    let (maps, (_folder, model)) = (cloth(32), square());
+    for name in ["a", "b"] {
+        std::fs::create_dir(at(name)).unwrap();
+        let sources = files(maps.path()).into_iter().map(|file| maps.path().join(file));
+        for source in sources.chain([model.clone()]) {
+            std::fs::copy(&source, at(name).join(source.file_name().unwrap())).unwrap();
+        }
+    }
+    let model = model.file_name().unwrap();
+    for (first, second, file) in [
+        (at("a"), at("b"), "cloth.kinran.json"),
+        (at("a").join(model), at("b").join(model), "square.kinran.json"),
+    ] {
+        let out = first.is_dir().then(|| at("baked")).unwrap_or_else(|| at("models"));
+        let bake = |source: &Path, flags: &[&str]| {
+            let said = kinran(&[&["bake", text(source), "-o", text(&out)], flags].concat());
+            assert_eq!(said.code, Some(0), "{}", said.err);
+        };
+        bake(&first, &[]);
+        let before = contents(&out);
+        refused(
+            &["bake", text(&second), "-o", text(&out)],
+            &[file, text(&first), text(&second), "--output", "--force"],
+        );
+        assert!(contents(&out) == before, "{} was changed", out.display());
+
+        // The same folder again, with another map in the old one's place.
+        if first.is_dir() {
+            write(&first, "cloth_diff.png", &image(32, Channels::Rgb, |_, _| [9, 9, 9, 255]));
+        }
+        bake(&first, &[]);
+        bake(&second, &["--force"]);
+        bake(&second, &[]);
     }
 }
 

@@ -182,6 +182,8 @@ pub(super) struct Name {
     /// Words behind the role that are neither a role's nor say how the file was saved; the name is read so only where
     /// other files speak for it.
     pub(super) tail: String,
+    /// A side such as 2K stands between the role and the tail.
+    pub(super) is_sized: bool,
     /// Which way green points, where the name tells.
     pub(super) green: Option<Green>,
     /// The role is one or two letters, which mean it only in company.
@@ -210,19 +212,27 @@ fn digits(word: &str) -> bool {
     !word.is_empty() && word.bytes().all(|b| b.is_ascii_digit())
 }
 
+fn is_number(word: &str) -> bool {
+    digits(word) && word.len() <= 5
+}
+
+/// Words that say how many texels a map has.
+fn is_size(word: &str) -> bool {
+    let side = |s: &str| is_number(s) && s.parse::<u32>().is_ok_and(|n| n >= 128 && n.is_power_of_two());
+    word.strip_suffix('k').is_some_and(is_number)
+        || side(word)
+        || word.split_once('x').is_some_and(|(w, h)| side(w) && side(h))
+}
+
 /// Words that say how a file was saved, not what it holds.
 fn is_noise(word: &str) -> bool {
-    let number = |s: &str| digits(s) && s.len() <= 5;
-    let side = |s: &str| number(s) && s.parse::<u32>().is_ok_and(|n| n >= 128 && n.is_power_of_two());
     IMAGE_EXTENSIONS.contains(&word)
         || matches!(
             word,
             "map" | "tex" | "texture" | "srgb" | "linear" | "raw" | "8bit" | "16bit" | "8b" | "16b"
         )
-        || word.strip_suffix('k').is_some_and(number)
-        || word.strip_prefix("lod").is_some_and(number)
-        || side(word)
-        || word.split_once('x').is_some_and(|(w, h)| side(w) && side(h))
+        || word.strip_prefix("lod").is_some_and(is_number)
+        || is_size(word)
 }
 
 /// Words that behind a role say which copy of a file it is, or in which colour space (Painter's `$colorSpace`).
@@ -245,7 +255,7 @@ pub(super) fn is_udim(word: &str) -> bool {
     word.len() == 4 && digits(word) && ("1001"..="1999").contains(&word)
 }
 
-/// Words that Poliigon puts behind the role of every file of a set.
+/// Words that Poliigon puts behind the role and the size, of all files of a set or of most.
 pub(super) const WORKFLOWS: [&str; 3] = ["metalness", "metallic", "specular"];
 
 /// The role of a word in lower case without separators, also with `map` or `16` behind it.
@@ -254,74 +264,153 @@ fn role_of(word: &str) -> Option<(Role, Option<Green>)> {
     role_of_word(word).or_else(shorter)
 }
 
+/// What normal maps are called.
+const NORMAL_WORDS: [&str; 10] =
+    ["normals", "normalmap", "normalbump", "normal", "norm", "nor", "nrml", "nrm", "nml", "nmap"];
+
+/// What stands behind it where green points up, and down.
+const UP_WORDS: [&str; 3] = ["gl", "ogl", "opengl"];
+const DOWN_WORDS: [&str; 3] = ["dx", "directx", "d3d"];
+
+/// What other maps are called, in lower case without separators.
+const WORDS: [(Role, &[&str]); 25] = [
+    (Role::Roughness, &["roughness", "rough", "rgh", "specularroughness"]),
+    (Role::Gloss, &["gloss", "glossiness", "glossy", "smoothness"]),
+    (Role::GlossU, &["glossu", "glossinessu"]),
+    (Role::GlossV, &["glossv", "glossinessv"]),
+    (
+        Role::Direction,
+        &["direction", "flow", "flowmap", "anisodirection", "anisotropydirection", "anisotropicdirection"],
+    ),
+    (Role::DirectionAngle, &["anisotropyangle", "anisoangle"]),
+    (Role::AnisotropyLevel, &["anisotropylevel", "anisolevel"]),
+    (Role::Anisotropy, &["anisotropy", "specularanisotropy"]),
+    (Role::Aniso, &["aniso"]),
+    (
+        Role::Color,
+        &[
+            "albedo",
+            "basecolor",
+            "basecolour",
+            "diffuse",
+            "diff",
+            "diffusecolor",
+            "color",
+            "colour",
+            "col",
+            "basemap",
+            "maintex",
+            "albedotransparency",
+            "diffusetransparency",
+        ],
+    ),
+    (Role::Occlusion, &["ao", "occ", "occlusion", "ambientocclusion", "mixedao"]),
+    (Role::Metallic, &["metallic", "metalness", "metal"]),
+    (
+        Role::Orm,
+        &[
+            "orm",
+            "arm",
+            "aorm",
+            "occlusionroughnessmetallic",
+            "occlusionroughnessmetalness",
+            "occlusionroughnessmetal",
+        ],
+    ),
+    (Role::Rma, &["rma", "rmao", "rmo"]),
+    (Role::Mra, &["mra", "mrao", "mro"]),
+    (
+        Role::OcclusionRoughness,
+        &["ord", "ordp", "orh", "occlusionroughness", "aorough", "aoroughness", "roughao", "roughnessao"],
+    ),
+    (Role::MetallicRoughness, &["metallicroughness"]),
+    (Role::MetallicSmoothness, &["metallicsmoothness", "metallicgloss", "metallicglossiness"]),
+    (Role::SpecularSmoothness, &["specularsmoothness", "specularglossiness", "specgloss"]),
+    (Role::MaskMap, &["maskmap"]),
+    (Role::Height, &["height", "disp", "displacement", "bump"]),
+    (
+        Role::Emissive,
+        &[
+            "emissive",
+            "emission",
+            "emit",
+            "emissivecolor",
+            "emissivecolour",
+            "emissioncolor",
+            "emissioncolour",
+        ],
+    ),
+    (
+        Role::Specular,
+        &[
+            "specular",
+            "specularlevel",
+            "specularcolor",
+            "specularcolour",
+            "spec",
+            "refl",
+            "reflection",
+            "reflectivity",
+        ],
+    ),
+    (Role::Opacity, &["opacity", "mask", "alpha", "transparency"]),
+    (
+        Role::Other,
+        &[
+            "cavity",
+            "curvature",
+            "thickness",
+            "position",
+            "id",
+            "translucency",
+            "transmission",
+            "transmissioncolor",
+            "sss",
+            "subsurface",
+            "subsurfacecolor",
+            "subsurfaceradius",
+            "ior",
+            "specularior",
+            "specularrotation",
+            "diffuseroughness",
+            "coat",
+            "coatcolor",
+            "coatnormal",
+            "coatroughness",
+            "clearcoat",
+            "clearcoatnormal",
+            "clearcoatroughness",
+            "sheen",
+            "sheencolor",
+            "sheenroughness",
+            "worldspacenormal",
+            "worldspacenormals",
+            "worldnormal",
+            "objectspacenormal",
+            "objectspacenormals",
+            "objectnormal",
+            "normalobject",
+            "normalobj",
+            "normalsobject",
+            "normalsobj",
+            "bentnormal",
+            "bentnormals",
+            "nra",
+            "nrao",
+        ],
+    ),
+];
+
 fn role_of_word(word: &str) -> Option<(Role, Option<Green>)> {
-    let normal =
-        ["normals", "normalmap", "normalbump", "normal", "norm", "nor", "nrml", "nrm", "nml", "nmap"];
-    for base in normal {
+    for base in NORMAL_WORDS {
         match word.strip_prefix(base) {
             Some("") => return Some((Role::Normal, None)),
-            Some("gl" | "ogl" | "opengl") => return Some((Role::Normal, Some(Green::Up))),
-            Some("dx" | "directx" | "d3d") => return Some((Role::Normal, Some(Green::Down))),
+            Some(behind) if UP_WORDS.contains(&behind) => return Some((Role::Normal, Some(Green::Up))),
+            Some(behind) if DOWN_WORDS.contains(&behind) => return Some((Role::Normal, Some(Green::Down))),
             _ => {}
         }
     }
-    let role = match word {
-        "roughness" | "rough" | "rgh" => Role::Roughness,
-        "gloss" | "glossiness" | "glossy" | "smoothness" => Role::Gloss,
-        "glossu" | "glossinessu" => Role::GlossU,
-        "glossv" | "glossinessv" => Role::GlossV,
-        "direction"
-        | "flow"
-        | "flowmap"
-        | "anisodirection"
-        | "anisotropydirection"
-        | "anisotropicdirection" => Role::Direction,
-        "anisotropyangle" | "anisoangle" => Role::DirectionAngle,
-        "anisotropylevel" | "anisolevel" => Role::AnisotropyLevel,
-        "anisotropy" => Role::Anisotropy,
-        "aniso" => Role::Aniso,
-        "albedo"
-        | "basecolor"
-        | "basecolour"
-        | "diffuse"
-        | "diff"
-        | "diffusecolor"
-        | "color"
-        | "colour"
-        | "col"
-        | "basemap"
-        | "maintex"
-        | "albedotransparency"
-        | "diffusetransparency" => Role::Color,
-        "ao" | "occlusion" | "ambientocclusion" | "mixedao" | "occ" => Role::Occlusion,
-        "metallic" | "metalness" | "metal" => Role::Metallic,
-        "orm"
-        | "arm"
-        | "aorm"
-        | "occlusionroughnessmetallic"
-        | "occlusionroughnessmetalness"
-        | "occlusionroughnessmetal" => Role::Orm,
-        "rma" | "rmao" | "rmo" => Role::Rma,
-        "mra" | "mrao" | "mro" => Role::Mra,
-        "ord" | "ordp" | "orh" | "roughao" | "roughnessao" | "aorough" | "aoroughness"
-        | "occlusionroughness" => Role::OcclusionRoughness,
-        "metallicroughness" => Role::MetallicRoughness,
-        "metallicsmoothness" | "metallicgloss" | "metallicglossiness" => Role::MetallicSmoothness,
-        "specularsmoothness" | "specularglossiness" | "specgloss" => Role::SpecularSmoothness,
-        "maskmap" => Role::MaskMap,
-        "height" | "disp" | "displacement" | "bump" => Role::Height,
-        "emissive" | "emission" | "emit" => Role::Emissive,
-        "specular" | "specularlevel" | "specularcolor" | "specularcolour" | "spec" | "refl"
-        | "reflection" | "reflectivity" => Role::Specular,
-        "opacity" | "mask" | "alpha" | "transparency" => Role::Opacity,
-        "cavity" | "curvature" | "thickness" | "position" | "id" | "translucency" | "transmission"
-        | "sss" | "subsurface" | "ior" | "worldspacenormal" | "worldspacenormals" | "worldnormal"
-        | "objectspacenormal" | "objectspacenormals" | "objectnormal" | "normalobject" | "normalobj"
-        | "normalsobject" | "normalsobj" | "bentnormal" | "bentnormals" | "clearcoat" | "clearcoatnormal"
-        | "clearcoatroughness" | "nra" | "nrao" => Role::Other,
-        _ => return None,
-    };
-    Some((role, None))
+    WORDS.iter().find(|(_, words)| words.contains(&word)).map(|(role, _)| (*role, None))
 }
 
 /// The role of Unreal's one and two letters; `a` and `b` are a colour only where the name begins as Unreal's do.
@@ -390,6 +479,7 @@ pub(super) fn readings(name: &str) -> Vec<Name> {
         stem: name.to_owned(),
         role: None,
         tail: String::new(),
+        is_sized: false,
         green: None,
         letter: false,
         unreal,
@@ -403,6 +493,7 @@ pub(super) fn readings(name: &str) -> Vec<Name> {
     let (mut end, mut unknown, mut ends_in_1024) = (all.len(), 0, false);
     // Pieces of the tail, the last first.
     let mut tail: Vec<usize> = Vec::new();
+    let mut is_sized = false;
     while end > 0 && unknown <= MOST_UNKNOWN {
         let word = &lower[end - 1];
         if is_noise_behind(&lower, end - 1, in_brackets(end - 1)) {
@@ -413,8 +504,10 @@ pub(super) fn readings(name: &str) -> Vec<Name> {
         let Some((begin, role, green, letter)) = role_at(&all, &lower, end, unreal && plain, plain) else {
             if is_noise(word) {
                 ends_in_1024 |= word == "1024" && tail.is_empty();
+                is_sized |= is_size(word) && !tail.is_empty();
             } else {
                 tail.push(end - 1);
+                is_sized = false;
                 unknown += 1;
             }
             end -= 1;
@@ -425,6 +518,7 @@ pub(super) fn readings(name: &str) -> Vec<Name> {
             stem: stem_before(name, &all, &lower, begin, unreal),
             role: Some(role),
             tail: behind.join("_"),
+            is_sized,
             green,
             letter,
             unclear: lower[begin] == "spec"
@@ -434,9 +528,9 @@ pub(super) fn readings(name: &str) -> Vec<Name> {
             ..nothing.clone()
         };
         let mut whole = reading(begin, role, green, letter);
-        // "x_rough_ao" holds both, or is the occlusion of a material called "x_rough".
+        // "x_rough_ao" holds both, or is the occlusion of a material called "x_rough"; so with "x_specular_roughness".
         let last = (begin + 1 < end && !all[end - 1].camel).then(|| role_of(&lower[end - 1])).flatten();
-        if let Some((last, green)) = last.filter(|_| role.is_packed()) {
+        if let Some((last, green)) = last.filter(|_| role.is_packed() || role == Role::Roughness) {
             whole.joined = true;
             found.push(whole);
             found.push(reading(end - 1, last, green, false));
@@ -444,6 +538,7 @@ pub(super) fn readings(name: &str) -> Vec<Name> {
             found.push(whole);
         }
         tail.extend((begin..end).rev());
+        is_sized = false;
         end = begin;
     }
     // A role of which nothing else is known comes first only if nothing stands behind it.
@@ -600,6 +695,16 @@ mod tests {
             ("satin_aniso_direction", "satin", Direction, None),
             ("satin_aniso", "satin", Aniso, None),
             ("aluminium_flow", "aluminium", Direction, None),
+            // Standard Surface
+            ("rock_specular_roughness", "rock", Roughness, None),
+            ("rock_specularRoughness", "rock", Roughness, None),
+            ("rock_specular_anisotropy", "rock", Anisotropy, None),
+            ("rock_emission_color", "rock", Emissive, None),
+            ("rock_coat_roughness", "rock", Other, None),
+            ("rock_coat_normal", "rock", Other, None),
+            ("rock_diffuse_roughness", "rock", Other, None),
+            ("rock_subsurface_color", "rock", Other, None),
+            ("specular_roughness", "", Roughness, None),
             // names alone, other separators, noise behind
             ("normal", "", Normal, None),
             ("Base Color", "", Color, None),
@@ -619,6 +724,38 @@ mod tests {
                 (*stem, Some(*role), *green),
                 "{name}: {got:?}"
             );
+        }
+    }
+
+    #[test]
+    fn a_name_that_is_read_is_not_on_the_page() {
+        let page = include_str!("../../../../docs/folders.md");
+        let quoted =
+            |cell: &str| -> Vec<String> { cell.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
+        for role in Role::all() {
+            let start = format!("| `{}` |", role.name());
+            let row = page.lines().find(|line| line.starts_with(&start));
+            let row = row.unwrap_or_else(|| panic!("docs/folders.md has no row for {role}"));
+            let cells: Vec<&str> = row.trim_matches('|').split(" | ").map(str::trim).collect();
+            assert_eq!(cells[1], role.channels(), "channels of {role}");
+            let mut wanted: Vec<&str> = match role {
+                Role::Normal => NORMAL_WORDS.into(),
+                _ => WORDS.iter().filter(|row| row.0 == role).flat_map(|row| row.1).copied().collect(),
+            };
+            let mut got = quoted(cells[2]);
+            got.sort();
+            wanted.sort_unstable();
+            assert_eq!(got, wanted, "names of {role}");
+        }
+        let line = |start: &str| {
+            let line = page.lines().find(|line| line.starts_with(start));
+            quoted(line.unwrap_or_else(|| panic!("docs/folders.md has no line \"{start}\"")))
+        };
+        assert_eq!(line("- +Y"), UP_WORDS);
+        assert_eq!(line("- −Y"), DOWN_WORDS);
+        for letters in line("- Letters").chunks(2) {
+            let [letter, role] = letters else { panic!("{letters:?}: a letter without its role") };
+            assert_eq!(role_of_letter(letter, true).map(Role::name), Some(role.as_str()), "{letter}");
         }
     }
 

@@ -21,11 +21,13 @@ pub(super) fn settle(found: &mut [Found]) {
         let chosen = match first.role {
             None => file.readings[1..].iter().find(|name| sets.accepts_unknown(name)),
             Some(_) if first.joined => file.readings.get(1).filter(|name| sets.has_whole(&name.stem, i)),
-            Some(_) => file.readings[1..].iter().find(|name| sets.accepts_role(name)),
+            Some(_) => file.readings[1..].iter().find(|name| sets.accepts_role(name, &first.stem)),
         };
         if let Some(chosen) = chosen.cloned() {
             if is_tile(&chosen.tail) {
                 add_note(&mut file.note, &format!("tile {}", chosen.tail));
+            } else if chosen.is_workflow() {
+                add_note(&mut file.note, &format!("{} is the set's workflow", chosen.tail));
             } else if first.role.is_some() && !chosen.tail.is_empty() {
                 add_note(&mut file.note, &format!("{} stands in every name of the set", chosen.tail));
             }
@@ -56,12 +58,25 @@ fn is_tile(tail: &str) -> bool {
     is_udim(tail) || tail.split_once('_').is_some_and(|(u, v)| part(u, 'u') && part(v, 'v'))
 }
 
+/// A material's name taken apart where it ends in the number of a tile: what is before it, and the tile.
+pub(super) fn without_tile(stem: &str) -> Option<(&str, &str)> {
+    let cuts = stem.rmatch_indices(|c: char| !c.is_alphanumeric()).take(2);
+    cuts.map(|(at, cut)| (&stem[..at], &stem[at + cut.len()..])).find(|(_, tile)| is_tile(tile))
+}
+
+impl Name {
+    /// Whether the tail is Poliigon's word for a workflow.
+    fn is_workflow(&self) -> bool {
+        self.is_sized && WORKFLOWS.iter().any(|word| self.tail.eq_ignore_ascii_case(word))
+    }
+}
+
 /// All readings with a role.
 struct Sets {
     /// Roles by stem and tail, in lower case.
     roles: BTreeMap<(String, String), BTreeSet<Role>>,
-    /// Stems of names that nothing stands behind, by file.
-    whole: Vec<Option<String>>,
+    /// Stems and roles of names that nothing stands behind, by file.
+    whole: Vec<Option<(String, Role)>>,
     /// Tails by stem, those of each file; empty ones too.
     tails: BTreeMap<String, Vec<String>>,
 }
@@ -71,7 +86,7 @@ impl Sets {
         let mut sets = Sets { roles: BTreeMap::new(), whole: Vec::new(), tails: BTreeMap::new() };
         for file in found {
             let first = &file.readings[0];
-            sets.whole.push(first.role.map(|_| first.stem.to_lowercase()));
+            sets.whole.push(first.role.map(|role| (first.stem.to_lowercase(), role)));
             let mut of_file: BTreeMap<String, String> = BTreeMap::new();
             for name in file.readings.iter().filter(|name| !(name.joined && file.readings.len() > 1)) {
                 let Some(role) = name.role else { continue };
@@ -93,7 +108,8 @@ impl Sets {
     /// Whether another file than `but` has this stem with nothing behind its role.
     fn has_whole(&self, stem: &str, but: usize) -> bool {
         let stem = stem.to_lowercase();
-        self.whole.iter().enumerate().any(|(i, whole)| i != but && whole.as_ref() == Some(&stem))
+        let is_it = |whole: &Option<(String, Role)>| whole.as_ref().is_some_and(|(other, _)| *other == stem);
+        self.whole.iter().enumerate().any(|(i, whole)| i != but && is_it(whole))
     }
 
     fn has_tiles(&self, stem: &str) -> bool {
@@ -108,26 +124,38 @@ impl Sets {
         is_tile(&name.tail) || (self.roles(&name.stem, &name.tail) >= SET && !is_picture())
     }
 
-    /// Whether what looks like a role at a name's end is a word of the whole set: every file of the set has it, or one of
-    /// the words that Poliigon calls its workflows by.
-    fn accepts_role(&self, name: &Name) -> bool {
+    /// Whether what looks like a role at a name's end, where the material would be called `whole`, is a word of the set.
+    fn accepts_role(&self, name: &Name, whole: &str) -> bool {
         let Some(tails) = self.tails.get(&name.stem.to_lowercase()).filter(|_| !name.stem.is_empty()) else {
             return false;
         };
-        let different: BTreeSet<&String> = tails.iter().collect();
-        let workflows = different.iter().all(|tail| WORKFLOWS.contains(&tail.as_str()));
-        let roles = |tail: &str| self.roles(&name.stem, tail);
-        if workflows {
-            different.iter().all(|tail| roles(tail) >= SET)
-        } else {
-            different.len() == 1 && !name.tail.is_empty() && roles(&name.tail) >= SET_OF_A_ROLE
+        if name.is_workflow() {
+            return self.roles_of_workflows(&name.stem) >= SET && !self.is_material(whole);
         }
+        let is_common = tails.iter().all(|tail| *tail == tails[0]);
+        is_common && !name.tail.is_empty() && self.roles(&name.stem, &name.tail) >= SET_OF_A_ROLE
     }
 
-    /// The material's name: with the tail, unless all files have the same.
+    /// How many roles there are of a stem, with a workflow behind them or nothing.
+    fn roles_of_workflows(&self, stem: &str) -> usize {
+        let tails = WORKFLOWS.iter().chain(&[""]);
+        let roles = tails.filter_map(|&tail| self.roles.get(&(stem.to_lowercase(), tail.into())));
+        roles.flatten().collect::<BTreeSet<_>>().len()
+    }
+
+    /// Whether a map whose role is no workflow is of a material of this name.
+    fn is_material(&self, stem: &str) -> bool {
+        let stem = stem.to_lowercase();
+        let other = |role: Role| !matches!(role, Role::Metallic | Role::Specular);
+        self.whole.iter().flatten().any(|(whole, role)| *whole == stem && other(*role))
+    }
+
+    /// The material's name: with the tail, unless all files have the same, or those that lack it lack a workflow.
     fn stem(&self, name: &Name) -> String {
         let tails = self.tails.get(&name.stem.to_lowercase());
-        let common = tails.is_some_and(|tails| tails.iter().all(|tail| name.tail.eq_ignore_ascii_case(tail)));
+        let same =
+            |tail: &String| name.tail.eq_ignore_ascii_case(tail) || (tail.is_empty() && name.is_workflow());
+        let common = tails.is_some_and(|tails| tails.iter().all(same));
         match (name.stem.as_str(), common && !is_tile(&name.tail)) {
             (stem, _) if name.tail.is_empty() => stem.to_owned(),
             ("", _) => name.tail.clone(),

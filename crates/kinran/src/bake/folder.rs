@@ -12,7 +12,9 @@ use super::{
     sheet_format, texture_files, texture_space, write_texture,
 };
 use crate::content::Content;
-use crate::outputs::{Space, check_space, has_extension, refuse_foreign, replaced_bytes};
+use crate::outputs::{
+    Space, check_space, has_extension, refuse_foreign, refuse_other_source, replaced_bytes,
+};
 use crate::{Console, Error};
 
 /// Bakes a folder and tells what came of it.
@@ -41,6 +43,10 @@ fn add_remarks(rows: &mut [Row], material: &str, file: &str, remarks: &[String])
 /// Extensions of files that leave something to choose when they are read, or say something of their own.
 const TALKATIVE: [&str; 6] = ["exr", "hdr", "tif", "tiff", "ktx2", "dds"];
 
+/// What a look at names leaves open.
+const UNSEEN: &str = "texels were not looked at, except of two files for one map: the bake itself checks whether normal \
+                      maps are normals, which way their green points, and whether directions and levels have their channels";
+
 /// Tells what was understood of a folder.
 pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
     let mut folder = scan(&args.input, &args.hints())?;
@@ -61,7 +67,7 @@ pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
         report.warnings.extend(material.compare_twins()?);
     }
     report.warnings.iter().for_each(|warning| console.warn(warning));
-    let text = folder.table();
+    let text = format!("{}\n{UNSEEN}\n", folder.table());
     console.result(&BakeReport::new(args, folder.rows, vec![report]), &text)
 }
 
@@ -83,7 +89,7 @@ pub fn bake_folder(args: &Args, console: &Console) -> Result<Vec<Report>, Error>
         let mut report = Report::new(args);
         report.warnings.clone_from(&loaded.notes);
         report.surfaces.push(bake_material(args, console, &loaded)?);
-        report.write(&args.output().join(report_file(&loaded.name)), Vec::new())?;
+        report.write(args, &report_file(&loaded.name), Vec::new())?;
         reports.push(report);
     }
     Ok(reports)
@@ -128,6 +134,7 @@ fn check(args: &Args, console: &Console, materials: &[MaterialMaps]) -> Result<(
         let reason = format!("two materials would both be written to {}; rename the files of one", pair[0]);
         return Err(Error::file_error(&args.input, reason));
     }
+    refuse_other_source(args.output(), &files, &args.input, args.force)?;
     refuse_foreign(args.output(), &files, args.force)?;
     let needed = space.beyond(replaced_bytes(args.output(), &files));
     if let Some(warning) = check_space(args.output(), needed)? {

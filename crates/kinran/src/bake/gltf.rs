@@ -23,7 +23,8 @@ use super::{
 use crate::content::Content;
 use crate::model::read_scene;
 use crate::outputs::{
-    Space, WrittenFile, changed_files, check_space, refuse_foreign, relative, replaced_bytes,
+    Space, WrittenFile, changed_files, check_space, refuse_foreign, refuse_other_source, relative,
+    replaced_bytes,
 };
 use crate::{Console, Error};
 
@@ -91,7 +92,7 @@ pub fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
     }
     let files = packed.files.iter();
     written.extend(files.map(|(path, bytes)| WrittenFile::new(relative(args.output(), path), bytes)));
-    report.write(&args.output().join(format!("{stem}.kinran.json")), written)?;
+    report.write(args, &format!("{stem}.kinran.json"), written)?;
     Ok(report)
 }
 
@@ -355,6 +356,7 @@ fn check(
     space.most += packed.files.iter().map(|(_, bytes)| bytes.len() as u64).sum::<u64>();
     files.extend(changed_files(args.output(), &packed));
     files.push(format!("{stem}.kinran.json"));
+    refuse_other_source(args.output(), &files, &args.input, args.force)?;
     refuse_foreign(args.output(), &files, args.force)?;
     let needed = space.beyond(replaced_bytes(args.output(), &files));
     if let Some(warning) = check_space(args.output(), needed)? {

@@ -747,7 +747,7 @@ fn bake_into(output: &Path, job: &Job, snapshot: &Snapshot, bars: &Progress) -> 
     let (input, output) = (snapshot.job.input.clone(), output.to_path_buf());
     let reports = match &snapshot.flags {
         Flags::Bake(flags) => {
-            let flags = Args { input, output: Some(output), ..(**flags).clone() };
+            let flags = Args { input, output: Some(output), is_copy: true, ..(**flags).clone() };
             match job.kind {
                 Kind::Mesh => bake_gltf(&flags, &silent).map(|report| vec![report]),
                 _ => bake_folder(&flags, &silent),

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::content::Content;
-use crate::outputs::WrittenFile;
+use crate::outputs::{WrittenFile, way};
 
 /// A file that went in.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -102,6 +102,9 @@ impl SurfaceReport {
 pub struct Report {
     /// Kinran's version.
     pub kinran: &'static str,
+    /// The folder or model that was baked, from the report's folder, `/`-separated; none in a library.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
     /// The filter's name.
     pub filter: &'static str,
     /// The footprint's shape.
@@ -121,6 +124,7 @@ impl Report {
     pub(super) fn new(args: &super::Args) -> Self {
         Report {
             kinran: env!("CARGO_PKG_VERSION"),
+            source: None,
             filter: args.filter.name(),
             kernel: format!("{:?}", args.kernel).to_lowercase(),
             surfaces: Vec::new(),
@@ -130,15 +134,21 @@ impl Report {
         }
     }
 
-    /// Writes the report; `others` are the files that were written besides the textures.
-    pub(super) fn write(&mut self, path: &Path, others: Vec<WrittenFile>) -> Result<(), Error> {
+    /// Writes the report as `file`; `others` are the files that were written besides the textures.
+    pub(super) fn write(
+        &mut self,
+        args: &super::Args,
+        file: &str,
+        others: Vec<WrittenFile>,
+    ) -> Result<(), Error> {
+        self.source = way(args.output(), &args.input).filter(|_| !args.is_copy);
         let textures = self.surfaces.iter().flat_map(|s| &s.outputs);
         let textures =
             textures.map(|o| WrittenFile { file: o.file.clone(), bytes: o.bytes, blake3: o.blake3.clone() });
         self.written = textures.chain(others).collect();
         let mut text = serde_json::to_string_pretty(self).map_err(|e| Error::Internal(e.to_string()))?;
         text.push('\n');
-        Ok(write_atomically(path, text.as_bytes())?)
+        Ok(write_atomically(&args.output().join(file), text.as_bytes())?)
     }
 
     /// A few lines for people: each file with its format and size, and the filter's error.
