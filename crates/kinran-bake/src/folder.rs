@@ -27,7 +27,7 @@ use serde::Serialize;
 
 use crate::aniso::NormalZ;
 
-pub use evidence::{GREEN_CONFIDENCE, GreenGuess, green_correlation, guess_green, odd_lengths};
+pub use evidence::{GREEN_CONFIDENCE, GreenGuess, green_correlation, guess_green, not_normals, odd_lengths};
 pub use load::{LoadedMap, LoadedMaterial};
 pub use names::{Green, Role};
 pub use twins::Twin;
@@ -620,6 +620,12 @@ fn leave_out_baked(listing: &mut Listing) {
 pub fn named_maps(folder: &Path) -> Result<Vec<(PathBuf, Role, Option<Green>)>, FolderError> {
     let found = list(folder)?.found.into_iter().filter(|file| !file.unread);
     Ok(found.filter_map(|file| Some((file.path, file.role?, file.name.green))).collect())
+}
+
+/// What a file's name alone tells it to hold, and which way green points where it says that too.
+pub fn named_role(path: &Path) -> Option<(Role, Option<Green>)> {
+    let found = found_file(path.to_path_buf());
+    Some((found.role?, found.name.green))
 }
 
 fn is_one_of(path: &Path, extensions: &[&str]) -> bool {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The operating system refused to read or write the file.
-    #[error("{}: {source}{}", path.display(), fix(source.kind()))]
+    #[error("{}: {}", path.display(), io_reason(source))]
     Io {
         /// The file.
         path: PathBuf,
@@ -37,10 +37,10 @@ impl Error {
     }
 }
 
-/// What a person can do about an I/O error of this kind, to be appended to its message.
-fn fix(kind: ErrorKind) -> &'static str {
-    match kind {
-        ErrorKind::NotFound => "; check that the file or its folder exists and is spelled so",
+/// What the operating system says of a file, and what a person can do about it.
+pub fn io_reason(error: &std::io::Error) -> String {
+    let fix = match error.kind() {
+        ErrorKind::NotFound => return "there is no such file or folder".into(),
         ErrorKind::PermissionDenied => {
             "; change the permissions of the file and its folder, or choose another"
         }
@@ -48,5 +48,6 @@ fn fix(kind: ErrorKind) -> &'static str {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "; free some space or choose another disk",
         ErrorKind::IsADirectory => "; name a file in it",
         _ => "",
-    }
+    };
+    format!("{error}{fix}")
 }

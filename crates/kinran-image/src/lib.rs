@@ -19,7 +19,7 @@ mod write;
 
 pub use block::{Encoder, Encoding, Preset, Role, decode, encode, encode_half, encode_parallel};
 pub use dds_file::{decode_dds, encode_dds};
-pub use error::Error;
+pub use error::{Error, io_reason};
 pub use image::{Channels, Image, MAX_IMAGE_BYTES, MAX_SIDE, Pixels};
 pub use ktx2_file::{decode_ktx2, encode_ktx2};
 pub use read::{IMAGE_EXTENSIONS, decode_image, has_image_extension, read_image, read_layer};

@@ -52,10 +52,15 @@ pub(crate) fn split<'a>(name: &Path, bytes: &'a [u8]) -> Result<Container<'a>, E
     if !bytes.starts_with(GLB_MAGIC) {
         let container = Container::new(bytes, None, Vec::new());
         if container.json.iter().find(|byte| !byte.is_ascii_whitespace()) != Some(&b'{') {
-            return Err(Error::malformed(
-                name,
-                "is not glTF: it begins neither with the GLB magic number nor with a JSON object",
-            ));
+            let reason = match name.extension().filter(|_| !is_gltf(name)) {
+                Some(extension) => {
+                    format!("`.{}` is not read; give .glb, .gltf or .obj", extension.to_string_lossy())
+                }
+                None => {
+                    "is not glTF: it begins neither with the GLB magic number nor with a JSON object".into()
+                }
+            };
+            return Err(Error::malformed(name, reason));
         }
         return Ok(container);
     }

@@ -438,7 +438,8 @@ fn paths_that_are_no_documents_are_named() {
     assert!(Scene::load(&gone).unwrap_err().to_string().contains("gone.glb"));
     for (name, content, word) in [
         ("a.glb", &b"glTF"[..], "cut off"),
-        ("b.png", b"\x89PNG\r\n\x1a\n", "is not glTF"),
+        ("b.png", b"\x89PNG\r\n\x1a\n", "`.png` is not read; give .glb, .gltf or .obj"),
+        ("no_extension", b"solid ball", "is not glTF"),
         ("c.gltf", b"", "is not glTF"),
         ("d.gltf", b"{\"asset\":", "JSON"),
     ] {

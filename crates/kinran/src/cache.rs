@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::bake::{LibraryArgs, cache_folder};
 use crate::outputs::bytes_text;
 use crate::table::list;
+use crate::values::counted;
 use crate::{Console, Error};
 
 /// Shows what `kinran bake kinran.toml` keeps of finished work, and makes room
@@ -80,9 +81,14 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
 
     let mut text = list(&entries.iter().map(row).collect::<Vec<_>>());
     if removed > 0 {
-        text += &format!("{removed} entries removed, {}\n", bytes_text(removed_bytes));
+        text += &format!("{} removed, {}\n", counted(removed, "entry", "entries"), bytes_text(removed_bytes));
     }
-    text += &format!("{} entries, {}, in {}\n", entries.len(), bytes_text(bytes), folder.display());
+    text += &format!(
+        "{}, {}, in {}\n",
+        counted(entries.len(), "entry", "entries"),
+        bytes_text(bytes),
+        folder.display()
+    );
     console.result(&CacheReport { folder, bytes, entries, removed, removed_bytes }, &text)
 }
 

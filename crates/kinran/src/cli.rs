@@ -1,11 +1,13 @@
 //! The command line as a whole: what it takes, and what becomes of what it cannot take.
 
 use std::ffi::OsString;
+use std::io::{Write, stderr};
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 
+use crate::values::range_in_words;
 #[cfg(feature = "view")]
 use crate::viewer;
 use crate::{
@@ -125,7 +127,10 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
                 return ExitCode::from(said.exit_code());
             }
             // Nobody is left to tell that the stream is closed.
-            let _ = error.print();
+            let _ = match error.render().to_string() {
+                text if text.contains("..=") => write!(stderr(), "{}", range_in_words(&text)),
+                _ => error.print(),
+            };
             ExitCode::from(error.exit_code() as u8)
         }
     }
@@ -247,7 +252,7 @@ pub(crate) fn sentence(error: &clap::Error) -> String {
     match error.kind() {
         // Help in the place of an error.
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => "no command; `kinran help` lists them".into(),
-        _ => said,
+        _ => range_in_words(&said),
     }
 }
 
@@ -268,6 +273,8 @@ mod tests {
         assert_eq!(told, "unexpected argument '--outptu' found; a similar argument exists: '--output'");
         assert_eq!(said(&["kinran"]), "no command; `kinran help` lists them");
         let told = said(&["kinran", "render", "x", "-o", "y.png", "--size", "huge"]);
+        let few = said(&["kinran", "render", "x", "--spp", "0"]);
+        assert!(few.contains("--spp") && few.ends_with("0 is not from 1 to 1048576"), "{few}");
         assert!(told.contains("--size") && told.contains("1280x720") && !told.contains("--help"), "{told}");
     }
 

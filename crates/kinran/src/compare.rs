@@ -17,7 +17,7 @@ use crate::picture::Picture;
 use crate::ranking::{Errors, FLIP_BEND, Order, order};
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::table::table;
-use crate::values::{filter, number};
+use crate::values::{counted, filter, number};
 use crate::view::{Samples, View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, outputs};
 
@@ -387,8 +387,15 @@ pub fn compare(
 }
 
 /// What stands under tables.
-pub(crate) const LEGEND: &str = "The nearest to ground truth is marked where it leads by more than noise explains. \
-    \"Noise\" is two ground truths of half the samples compared.";
+pub(crate) fn footnote<'a>(findings: impl IntoIterator<Item = &'a Finding>) -> &'static str {
+    match findings.into_iter().any(|finding| finding.rmse.best.or(finding.flip.best).is_some()) {
+        true => {
+            "The nearest to ground truth is marked where it leads by more than noise explains. \
+             \"Noise\" is two ground truths of half the samples compared."
+        }
+        false => "\"Noise\" is two ground truths of half the samples compared.",
+    }
+}
 
 /// The value at `index`, which is one that is there or the next.
 fn put<T>(values: &mut Vec<T>, index: usize, value: T) {
@@ -560,7 +567,11 @@ impl Finding {
     fn sentence(&self) -> String {
         let filters = self.filters;
         let samples = self.truth_samples_per_pixel;
-        let head = format!("Distance {}, {samples} samples of ground truth:", self.distance);
+        let head = format!(
+            "Distance {}, {} of ground truth:",
+            self.distance,
+            counted(samples as usize, "sample", "samples")
+        );
         let [rmse, flip] = [&self.rmse, &self.flip].map(|ranking| ranking.phrase(filters));
         match (filters, self.only_noise) {
             (1, true) => format!("{head} {} is off by noise alone.", self.rmse.nearest[0]),
@@ -615,7 +626,7 @@ impl Comparison {
         let noise = |f: &Finding| [format!("{:.4}", f.noise.rmse), format!("{:.4}", f.noise.flip)];
         rows.push(std::iter::once("noise".to_owned()).chain(findings.iter().flat_map(noise)).collect());
         let says: String = findings.iter().map(|finding| format!("{}\n", finding.says)).collect();
-        format!("{}\n{says}{LEGEND}\n", table(&rows))
+        format!("{}\n{says}{}\n", table(&rows), footnote(findings))
     }
 
     /// Writes `compare.png`, `distance.png`, every picture alone and `compare.json` to `folder`, which

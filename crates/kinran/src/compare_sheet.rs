@@ -1,7 +1,8 @@
 //! The layout of comparison pictures.
 
-use crate::compare::{Comparison, Difference, Finding, LEGEND, MethodReport, Ranking, Series};
+use crate::compare::{Comparison, Difference, Finding, MethodReport, Ranking, Series, footnote};
 use crate::picture::{Color, INK, PAPER, Picture, text_width, wrapped};
+use crate::values::counted;
 
 /// All colours and lengths are chosen by eye.
 const FAINT: Color = [170, 172, 180];
@@ -77,8 +78,11 @@ pub(crate) fn comparison_sheet(comparison: &Comparison) -> Picture {
     let mut sheet = Picture::new(sheet_width, end + words.height(&scale), PAPER);
 
     let title_end = sheet.text((GAP, scale.length(40)), scale.title(), INK, &report.title);
-    let samples =
-        format!("{} samples, ground truth {}", finding.samples_per_pixel, finding.truth_samples_per_pixel);
+    let samples = format!(
+        "{}, ground truth {}",
+        counted(finding.samples_per_pixel as usize, "sample", "samples"),
+        finding.truth_samples_per_pixel
+    );
     sheet.text((title_end + 2 * GAP, scale.length(40)), scale.note(), FAINT, &samples);
 
     let range = error_range(&comparison.series[1..]);
@@ -151,7 +155,9 @@ struct Words(Vec<String>);
 
 impl Words {
     fn new<'a>(scale: &Scale, sheet_width: u32, findings: impl IntoIterator<Item = &'a Finding>) -> Self {
-        let texts = findings.into_iter().map(|finding| finding.says.as_str()).chain([LEGEND]);
+        let findings: Vec<&Finding> = findings.into_iter().collect();
+        let footnote = footnote(findings.iter().copied());
+        let texts = findings.into_iter().map(|finding| finding.says.as_str()).chain([footnote]);
         Words(texts.flat_map(|text| wrapped(scale.note(), sheet_width - 2 * GAP, text)).collect())
     }
 

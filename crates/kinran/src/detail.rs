@@ -6,9 +6,14 @@ mod model;
 mod page;
 mod solve;
 
+use std::path::Path;
+
 use clap::{Subcommand, ValueEnum};
 use kinran_bake::detail::MapKind;
+use kinran_bake::folder::{Role, named_role};
 use kinran_image::{Encoder, Encoding, Format, Preset};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::{Console, Error};
 
@@ -46,10 +51,10 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
 }
 
 /// What a map holds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum KindName {
     /// sRGB colour
-    #[default]
     Color,
     /// Roughness, gloss, specular, occlusion, metallic, or several of them
     Data,
@@ -57,6 +62,49 @@ pub enum KindName {
     Normal,
     /// Aniso texels
     Aniso,
+}
+
+impl KindName {
+    /// The name in flags and manifests.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            KindName::Color => "color",
+            KindName::Data => "data",
+            KindName::Normal => "normal",
+            KindName::Aniso => "aniso",
+        }
+    }
+
+    /// How a map of a role is solved, where it is one that is.
+    pub(crate) fn of_role(role: Role) -> Option<Self> {
+        match role {
+            Role::Color => Some(KindName::Color),
+            Role::Normal => Some(KindName::Normal),
+            Role::Roughness | Role::Gloss | Role::Occlusion | Role::Metallic | Role::Specular => {
+                Some(KindName::Data)
+            }
+            role if role.is_packed() => Some(KindName::Data),
+            Role::Aniso => Some(KindName::Aniso),
+            _ => None,
+        }
+    }
+
+    /// What a file's name says.
+    pub(crate) fn of_file(path: &Path) -> Option<Self> {
+        KindName::of_role(named_role(path)?.0)
+    }
+}
+
+/// Where the kind of a target was taken from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum KindSource {
+    /// `--kind`.
+    Flag,
+    /// The target's name.
+    Name,
+    /// Nothing says it: it is taken for colour.
+    Assumed,
 }
 
 impl From<KindName> for MapKind {

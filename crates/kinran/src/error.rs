@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::Failure;
+use crate::values::counted;
 
 /// Why a command failed. The message is one line: what is wrong where, and what to do about it.
 #[derive(Debug, thiserror::Error)]
@@ -39,12 +40,14 @@ pub enum Error {
     #[error(transparent)]
     Manifest(#[from] kinran_bake::manifest::ManifestError),
     /// Entries of a manifest failed; each has told why.
-    #[error("{failed} of {of} entries failed; the others are done")]
+    #[error("{failed} of {} failed{}", counted(*of, "entry", "entries"), if *done && failed < of { "; the others are done" } else { "" })]
     Entries {
         /// How many.
         failed: usize,
         /// Of how many.
         of: usize,
+        /// Whether anything was done at all, and not only planned.
+        done: bool,
     },
     /// A picture could not be rendered.
     #[error(transparent)]

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 
 use kinran_bake::folder::{Hints, Role, inner_folder, named_maps, scan};
 use kinran_bake::manifest::Manifest;
-use kinran_image::write_atomically;
+use kinran_image::{has_image_extension, write_atomically};
 use kinran_scene::Document;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::detail::KindName;
 use crate::outputs::has_extension;
+use crate::values::counted;
 use crate::{Console, Error, Progress};
 
 /// Writes a kinran.toml that lists what a folder holds, for `kinran bake kinran.toml`
@@ -153,11 +155,7 @@ impl Survey {
 
     /// "61 folders with maps and 2 models".
     pub(crate) fn counts(&self) -> String {
-        let count = |n: usize, one: &str, many: &str| match n {
-            0 => None,
-            1 => Some(format!("1 {one}")),
-            n => Some(format!("{n} {many}")),
-        };
+        let count = |n: usize, one, many| (n > 0).then(|| counted(n, one, many));
         let parts = [
             count(self.folders.len(), "folder with maps", "folders with maps"),
             count(self.models.len(), "model", "models"),
@@ -259,6 +257,8 @@ impl Survey {
 #[derive(Default)]
 struct Found {
     folders: Vec<PathBuf>,
+    /// Folders of images whose names tell no map.
+    nameless: Vec<PathBuf>,
     models: Vec<PathBuf>,
     /// Folders of targets, and those of tiles beside them.
     targets: Vec<(PathBuf, PathBuf)>,
@@ -290,8 +290,12 @@ impl Found {
         if is_output && folder != Path::new("") {
             return Ok(());
         }
+        if children.is_empty() && folder != Path::new("") {
+            self.leave_out(folder, "is empty; put maps or a model into it, or remove it");
+        }
         let (folders, files): (Vec<PathBuf>, Vec<PathBuf>) =
             children.into_iter().partition(|path| root.join(path).is_dir());
+        let has_images = files.iter().any(|path| has_image_extension(path));
         for path in files {
             if kinran_scene::is_gltf(&path) {
                 self.models.push(path);
@@ -305,6 +309,8 @@ impl Found {
         let apart = folder == Path::new("") && inner.is_some();
         if !is_output && !apart && !named_maps(&full).unwrap_or_default().is_empty() {
             self.folders.push(folder.to_path_buf());
+        } else if !is_output && folder != Path::new("") && inner.is_none() && has_images {
+            self.nameless.push(folder.to_path_buf());
         }
         let called = |name: &str| {
             let is = |path: &&PathBuf| path.file_name().is_some_and(|n| n.eq_ignore_ascii_case(name));
@@ -354,6 +360,18 @@ impl Found {
                 Err(error) => self.leave_out(&folder, without(&error, &full)),
             }
         }
+        for folder in std::mem::take(&mut self.nameless) {
+            let full = root.join(&folder);
+            let images = children(root, &folder).unwrap_or_default();
+            let of_model =
+                |path: &PathBuf| root.join(path).canonicalize().is_ok_and(|path| of_models.contains(&path));
+            if images.iter().filter(|path| has_image_extension(path)).all(of_model) {
+                continue;
+            }
+            if let Err(error) = scan(&full, &Hints::default()) {
+                self.leave_out(&folder, without(&error, &full));
+            }
+        }
         let details = self.details(root);
         Survey {
             root: root.to_path_buf(),
@@ -377,7 +395,9 @@ impl Found {
             };
             let all_tiles = maps(&tiles);
             for (target, role) in maps(&targets) {
-                let Some(kind) = kind(role) else { continue };
+                // What is packed is solved only where somebody says so.
+                let kind = KindName::of_role(role).filter(|_| !role.is_packed()).map(KindName::name);
+                let Some(kind) = kind else { continue };
                 let stem =
                     |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
                 let own = stem(&target);
@@ -411,17 +431,6 @@ impl Found {
             }
         }
         details
-    }
-}
-
-/// What `kinran detail solve --kind` calls a map, where it is one that is solved.
-fn kind(role: Role) -> Option<&'static str> {
-    match role {
-        Role::Color => Some("color"),
-        Role::Normal => Some("normal"),
-        Role::Roughness | Role::Gloss | Role::Occlusion | Role::Metallic | Role::Specular => Some("data"),
-        Role::Aniso => Some("aniso"),
-        _ => None,
     }
 }
 

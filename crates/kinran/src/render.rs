@@ -12,7 +12,7 @@ pub use crate::backend::Backend;
 use crate::model::Model;
 use crate::skin::missing_curvature;
 use crate::surfaces::{Mips, scene_surfaces};
-use crate::values::filter;
+use crate::values::{counted, filter};
 use crate::view::{View, ViewArgs, file_name};
 use crate::{Console, Error, outputs};
 
@@ -149,12 +149,12 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         warnings,
     };
     let text = format!(
-        "{}: {}x{}, {} samples a pixel, {} triangles, filter {}",
+        "{}: {}x{}, {} a pixel, {}, filter {}",
         output.display(),
         summary.width,
         summary.height,
-        summary.samples_per_pixel,
-        summary.triangles,
+        counted(summary.samples_per_pixel as usize, "sample", "samples"),
+        counted(summary.triangles, "triangle", "triangles"),
         summary.filter
     );
     console.result(&summary, &text)?;

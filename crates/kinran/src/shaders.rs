@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::table::list;
+use crate::values::counted;
 use crate::{Console, Error, outputs};
 
 /// Writes the shader library in a language, or prints a module of it
@@ -145,7 +146,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     };
     outputs::check_folder(folder)?;
     let files = write(language, args.module.is_none(), &chosen, folder, args.force)?;
-    let summary = format!("{} files are in {}", files.len(), folder.display());
+    let summary = format!("{} in {}", counted(files.len(), "file", "files"), folder.display());
     console.result(&Report { language: Some(language), files, text: None, modules: Vec::new() }, &summary)
 }
 

@@ -36,6 +36,19 @@ pub(crate) fn number(text: &str, range: std::ops::RangeInclusive<f32>) -> Result
     }
 }
 
+/// "1 file", "2 files".
+pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// A message of `clap` with Rust's ranges in words: "0 is not in 1..=16" is "0 is not from 1 to 16".
+pub(crate) fn range_in_words(message: &str) -> String {
+    match message.split_once(" is not in ") {
+        Some((head, range)) => format!("{head} is not from {}", range.replacen("..=", " to ", 1)),
+        None => message.to_owned(),
+    }
+}
+
 /// Names, one after the other, as messages list them.
 pub(crate) fn list(names: &[String]) -> String {
     if names.is_empty() { "none".into() } else { names.join(", ") }
@@ -60,6 +73,12 @@ mod tests {
         for bad in ["", "0x4", "4x0", "x", "4x", "-1x4", "40000x4", "1e3", "4x4x4", "99999999999999999999"] {
             assert!(size(bad).is_err(), "{bad:?} became {:?}", size(bad));
         }
+    }
+
+    #[test]
+    fn people_are_told_ranges_as_programs_write_them() {
+        assert_eq!(range_in_words("'--spp <N>': 0 is not in 1..=16"), "'--spp <N>': 0 is not from 1 to 16");
+        assert_eq!(range_in_words("a folder..=is not"), "a folder..=is not");
     }
 
     #[test]

@@ -11,7 +11,7 @@ mod sample_assets;
 use std::path::{Path, PathBuf};
 
 use common::{files, kinran, kinran_json, refused, text};
-use kinran_image::{Channels, Image, Pixels, read_image, read_texture, write_png};
+use kinran_image::{Channels, Format, Image, Pixels, read_image, read_texture, write_png};
 use kinran_scene::{DetailMap, Scene};
 use sample_assets::sample_assets;
 use serde_json::Value;
@@ -105,6 +105,68 @@ fn a_target_is_solved_into_textures_a_report_and_pictures() {
     assert!(
         bytes("synthesized_bytes") == bytes("target_bytes") && bytes("unique_bytes") >= bytes("target_bytes")
     );
+}
+
+/// Normals of slanted waves, green up, or down as DirectX has it.
+fn waves(y_down: bool) -> Image {
+    let texel = |x: u32, y: u32| {
+        // Of the height sin(0.4 x + 0.3 v), v counted downwards.
+        let slope = (0.4 * x as f32 + 0.3 * y as f32).cos();
+        let (x, y) = (-0.4 * slope, 0.3 * slope * if y_down { -1.0 } else { 1.0 });
+        let length = (x * x + y * y + 1.0).sqrt();
+        [x, y, 1.0].map(|n| ((n / length * 0.5 + 0.5) * 255.0 + 0.5) as u8)
+    };
+    let bytes = (0..64).flat_map(|y| (0..64).flat_map(move |x| texel(x, y)));
+    Image::new(64, 64, Channels::Rgb, Pixels::U8(bytes.collect())).unwrap()
+}
+
+#[test]
+fn normals_are_solved_as_colours_whatever_their_name_says() {
+    let folder = Folder::new();
+    for (name, y_down) in
+        [("Fabric_Normal", false), ("Dark_Normal", true), ("tile_normal", false), ("cloth", false)]
+    {
+        write_png(&folder.path(&format!("{name}.png")), &waves(y_down)).unwrap();
+    }
+    write_png(&folder.path("tile_color.png"), &scan(64, 5)).unwrap();
+    let words = |target: &str, tile: &str, more: &[&str]| -> Vec<String> {
+        let layer = format!("--layer={}", folder.text(tile));
+        let first = ["detail".into(), "solve".into(), folder.text(target), layer];
+        let rest = ["-o".into(), folder.text("out"), "--force".into()];
+        first.into_iter().chain(rest).chain(more.iter().map(|&word| word.into())).collect()
+    };
+    let warnings = |report: &Value| report["warnings"].to_string();
+
+    let report = run(&words("Fabric_Normal.png", "tile_normal.png", &[]));
+    assert_eq!((&report["kind"], &report["kind_source"]), (&"normal".into(), &"name".into()), "{report}");
+    assert_eq!(warnings(&report), "[]");
+    let texture = read_texture(&folder.path("out/Fabric_Normal_synthesized.ktx2")).unwrap();
+    assert_eq!(texture.format, Format::Bc5, "normals were written as colours");
+    let all = words("Fabric_Normal.png", "tile_normal.png", &[]);
+    let said = kinran(&all.iter().map(String::as_str).collect::<Vec<_>>()).out;
+    for part in [
+        "kind normal, by the target's name".to_owned(),
+        "\nblended error: root mean square".into(),
+        format!("and Fabric_Normal.detail.json, in {}", folder.text("out")),
+    ] {
+        assert!(said.contains(&part), "wanted {part:?} in {said}");
+    }
+
+    let all = words("cloth.png", "tile_normal.png", &[]);
+    refused(
+        &all.iter().map(String::as_str).collect::<Vec<_>>(),
+        &["cloth.png", "look like normals", "--kind normal"],
+    );
+    let report = run(&words("cloth.png", "tile_normal.png", &["--kind", "normal"]));
+    assert_eq!(report["kind_source"], "flag", "{report}");
+    let report = run(&words("wall.png", "brick.png", &[]));
+    assert_eq!((&report["kind"], &report["kind_source"]), (&"color".into(), &"assumed".into()), "{report}");
+
+    let told = warnings(&run(&words("Fabric_Normal.png", "tile_color.png", &[])));
+    assert!(told.contains("tile_color.png: its name says color"), "{told}");
+    let told = warnings(&run(&words("Dark_Normal.png", "tile_normal.png", &[])));
+    assert!(told.contains("Dark_Normal.png: its slopes say that green points down"), "{told}");
+    assert_eq!(warnings(&run(&words("Dark_Normal.png", "tile_normal.png", &["--y-down"]))), "[]");
 }
 
 #[test]

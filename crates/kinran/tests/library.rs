@@ -257,6 +257,10 @@ fn a_failing_entry_stops_the_others() {
     let library = Library::new(3);
     fs::write(library.path("materials/cloth01/normal.png"), "not an image").unwrap();
     library.describe("[[aniso]]\ninput = [\"materials/*\", \"nowhere\"]\n");
+    let (code, _, said) = library.bake(&["--dry-run"]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("nowhere does not exist") && said.contains("1 of 4 entries failed"), "{said}");
+    assert!(!said.contains("are done"), "a plan has done nothing: {said}");
     let (code, report, said) = library.bake(&[]);
     assert_eq!(code, Some(2), "{said}");
     let found = statuses(&report);
@@ -293,10 +297,18 @@ fn a_wrong_flag_is_found_while_baking() {
             "[[mesh]]\ninput = \"*.glb\"\nzstd = true\n",
             ["kinran.toml:4:1: ", "expected a string or a number"],
         ),
-        ("[[mesh]]\ninput = \"*.glb\"\nzstd = 99\n", ["kinran.toml:4:8: ", "0..=22"]),
+        ("[[mesh]]\ninput = \"*.glb\"\nzstd = 99\n", ["kinran.toml:4:8: ", "99 is not from 0 to 22"]),
         (
             "[[mesh]]\ninput = \"*.glb\"\nwatch = true\n",
             ["kinran.toml:4:1: ", "on the command line as --watch"],
+        ),
+        (
+            "[[aniso]]\ninput = \"materials/*\"\ny_down = true\n",
+            ["kinran.toml:4:1: unknown key `y_down`", "did you mean `y-down`?"],
+        ),
+        (
+            "[[aniso]]\ninput = \"materials/*\"\n\"--y-down\" = true\n",
+            ["kinran.toml:4:1: unknown key `--y-down`", "did you mean `y-down`?"],
         ),
         (
             "[[aniso]]\ninput = \"materials/*\"\ny-up = true\ny-down = true\n",
@@ -456,13 +468,16 @@ fn a_target_is_solved_otherwise_than_by_hand() {
     }
     library.describe(
         "[defaults]\npreset = \"fast\"\nfilter = \"linear\"\n[tile.brick]\nfile = \"tiles/brick.png\"\nscale = 2\n\
-         rotation = 30\n[[detail]]\ninput = \"wall.png\"\noutput = \"walls\"\nformat = \"bc1\"\nlayer = [\n\
+         rotation = 30\n[[detail]]\ninput = \"wall.png\"\noutput = \"walls\"\nkind = \"color\"\nformat = \"bc1\"\nlayer = [\n\
          { tile = \"brick\", rotation = 90 },\n{ tile = \"tiles/moss.png\", mirror = true, mask = \"mask.png\", \
          channel = \"g\" }]\n",
     );
     assert!(all(&library.statuses(&[]), "baked"));
     let by_hand = Command::new(env!("CARGO_BIN_EXE_kinran"))
-        .args(["detail", "solve", "wall.png", "--format", "bc1", "--preset", "fast", "-o", "by_hand"])
+        .args([
+            "detail", "solve", "wall.png", "--kind", "color", "--format", "bc1", "--preset", "fast", "-o",
+            "by_hand",
+        ])
         .args(["--layer", "tiles/brick.png,scale=2,rotation=90"])
         .args(["--layer", "tiles/moss.png,mirror,mask=mask.png,channel=g"])
         .current_dir(library.root.path())
@@ -482,6 +497,36 @@ fn a_target_is_solved_otherwise_than_by_hand() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.code() == Some(2) && said.contains("kinran.toml:4:10: "), "{said}");
     assert!(said.contains("a layer knows no sclae=2"), "{said}");
+}
+
+#[test]
+fn a_second_run_keeps_doubts_to_itself() {
+    let library = Library::new(1);
+    for (name, seed) in [("wall_normal.png", 1), ("brick_color.png", 2)] {
+        fs::write(library.path(name), normals(seed)).unwrap();
+    }
+    library.describe("[[detail]]\ninput = \"wall_normal.png\"\nlayer = [{ tile = \"brick_color.png\" }]\n");
+    for status in ["baked", "up-to-date"] {
+        let (code, report, said) = library.bake(&[]);
+        assert_eq!((code, &report["entries"][0]["status"]), (Some(0), &Value::from(status)), "{said}");
+        let warnings = &report["entries"][0]["warnings"];
+        for part in ["brick_color.png: its name says color", "`kind`"] {
+            let told = warnings.as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains(part));
+            assert!(told && said.contains(part), "{status}: wanted {part:?} in {warnings} and {said}");
+        }
+    }
+}
+
+#[test]
+fn fixes_of_entries_are_words_of_the_command_line_alone() {
+    let library = Library::new(1);
+    fs::write(library.path("wall.png"), normals(1)).unwrap();
+    library.describe("[[detail]]\ninput = \"wall.png\"\nlayer = [{ tile = \"wall.png\" }]\n");
+    let (code, report, said) = library.bake(&[]);
+    let wanted = "(in the manifest: `kind = \"normal\"`, `kind = \"color\"`)";
+    assert!(code == Some(2) && said.contains(wanted), "wanted {wanted} in {said}");
+    let message = report["entries"][0]["error"]["message"].as_str().unwrap();
+    assert!(message.ends_with(wanted), "wanted {wanted} at the end of {message}");
 }
 
 #[test]
@@ -668,7 +713,7 @@ fn a_map_that_is_saved_while_it_waits_is_kept_under_its_old_hash() {
     gltf(&library.path("props"));
     library.describe(
         "[[aniso]]\ninput = \"materials/*\"\n[[mesh]]\ninput = \"props/*.gltf\"\n[[detail]]\ninput = \"wall.png\"\n\
-         output = \"walls\"\nformat = \"bc1\"\nlayer = [{ tile = \"brick.png\", scale = 2 }]\n",
+         output = \"walls\"\nkind = \"color\"\nformat = \"bc1\"\nlayer = [{ tile = \"brick.png\", scale = 2 }]\n",
     );
     fs::write(library.path("wall.png"), normals(1)).unwrap();
     let changing = [
@@ -797,7 +842,7 @@ fn a_library_bakes_its_own_results() {
     fs::write(library.path("wall.png"), normals(1)).unwrap();
     fs::write(library.path("brick.png"), normals(2)).unwrap();
     let entries = "[[mesh]]\ninput = \"**/*.glb\"\noutput = \"models\"\n[[aniso]]\ninput = \"*/*\"\n\
-                   [[detail]]\ninput = \"wall.png\"\nboard = true\nformat = \"bc1\"\n\
+                   [[detail]]\ninput = \"wall.png\"\nboard = true\nkind = \"color\"\nformat = \"bc1\"\n\
                    layer = [{ tile = \"brick.png\" }]\n";
     library.describe(entries);
     let first = library.statuses(&[]);
@@ -881,8 +926,8 @@ fn the_same_version_bakes_other_bytes_under_the_same_keys() {
     fs::write(library.path("brick.png"), normals(2)).unwrap();
     library.describe(
         "[[aniso]]\ninput = \"materials/*\"\nencoder = \"portable\"\nform = \"both\"\n[[mesh]]\ninput = \"*.glb\"\n\
-         encoder = \"portable\"\n[[detail]]\ninput = \"wall.png\"\nformat = \"bc1\"\nlayer = [{ tile = \"brick.png\" }]\n\
-         [[skin]]\nsize = \"32x32\"\n",
+         encoder = \"portable\"\n[[detail]]\ninput = \"wall.png\"\nkind = \"color\"\nformat = \"bc1\"\n\
+         layer = [{ tile = \"brick.png\" }]\n[[skin]]\nsize = \"32x32\"\n",
     );
     library.statuses(&[]);
     let mut hasher = blake3::Hasher::new();

@@ -98,7 +98,7 @@ pub fn green_correlation(image: &Image) -> f64 {
 /// real maps: at most 0.5 %); if blue is below 0.5 on average (real: 0.91 and more), or red or green outside
 /// 0.35 to 0.65 (real: 0.47 to 0.54). Of 134 colour, roughness, height, specular, occlusion, metallic, flow
 /// and mask images all are refused.
-pub(super) fn not_normals(image: &Image) -> Option<String> {
+pub fn not_normals(image: &Image) -> Option<String> {
     if image.channels < Channels::Rgb {
         return Some("it is grey, a normal map has red and green".into());
     }

@@ -28,6 +28,7 @@ use crate::detail::{self, SolveArgs, solve_target};
 use crate::outputs::{Space, check_space};
 use crate::skin_lut;
 use crate::table::list;
+use crate::values::counted;
 use crate::{Console, Error, Failure, Progress};
 
 /// Bytes that a cache may hold where nothing says otherwise; chosen by eye: a few hundred 4096² materials.
@@ -148,7 +149,7 @@ impl LibraryReport {
             let bytes: u64 = entry.files.iter().map(|file| file.bytes).sum();
             let size = match entry.files.len() {
                 0 => String::new(),
-                count => format!("{count} files, {:.1} KiB", bytes as f64 / 1024.0),
+                count => format!("{}, {:.1} KiB", counted(count, "file", "files"), bytes as f64 / 1024.0),
             };
             vec![entry.name.clone(), entry.status.name().into(), entry.folder.display().to_string(), size]
         });
@@ -189,6 +190,9 @@ impl LibraryReport {
 struct Standing {
     key: String,
     files: Vec<(StoredFile, Stamp)>,
+    /// What was doubtful when they were baked.
+    #[serde(default)]
+    warnings: Vec<String>,
 }
 
 /// A library on its way.
@@ -217,10 +221,10 @@ pub fn bake_library(args: &Args, console: &Console) -> Result<(), Error> {
         return watch::watch(args, console);
     }
     let built = build(args, console, &mut Failures::new())?;
-    built.tell(console)?;
+    built.tell(console, true)?;
     match built.report.count(Status::Failed) {
         0 => Ok(()),
-        failed => Err(Error::Entries { failed, of: built.report.entries.len() }),
+        failed => Err(Error::Entries { failed, of: built.report.entries.len(), done: !args.dry_run }),
     }
 }
 
@@ -241,9 +245,10 @@ impl Built {
         self.report.count(Status::UpToDate) < self.report.entries.len()
     }
 
-    /// Tells what was done, what is doubtful, and last what failed.
-    fn tell(&self, console: &Console) -> Result<(), Error> {
-        for entry in &self.report.entries {
+    /// Tells what was done, what is doubtful, where `again` also of entries that were up to date, and last what failed.
+    fn tell(&self, console: &Console, again: bool) -> Result<(), Error> {
+        let told = |entry: &&EntryReport| again || entry.status != Status::UpToDate;
+        for entry in self.report.entries.iter().filter(told) {
             for warning in &entry.warnings {
                 console.warn(format!("{}: {warning}", entry.name));
             }
@@ -290,9 +295,11 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
     let mut todo: Vec<(usize, Key, Job, Flags)> = Vec::new();
     for ((at, job, flags), key) in work.into_iter().zip(keys) {
         match key {
-            Err(error) => entries[at].fail(Failure::of(&error)),
-            Ok(key) => match library.standing_files(&job, &key) {
-                Some(files) => (entries[at].files, entries[at].status) = (files, Status::UpToDate),
+            Err(error) => entries[at].fail(failure(&job, &error)),
+            Ok(key) => match library.standing(&job, &key) {
+                Some((files, warnings)) => {
+                    entries[at] = EntryReport { files, warnings, ..EntryReport::new(&job) };
+                }
                 None => match failures.get(&job.folder) {
                     Some((Some(known), why)) if *known == key => entries[at].fail(why.clone()),
                     _ => todo.push((at, key, job, flags)),
@@ -309,7 +316,9 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
         let gone = library.gone(&entries);
         let (left_over, pruned) = if args.library.prune { (Vec::new(), gone) } else { (gone, Vec::new()) };
         let report = LibraryReport { entries, left_over, pruned, space, ..LibraryReport::default() };
-        return Ok(library.built(report, Vec::new()));
+        let why = |entry: &EntryReport| Some(format!("{}: {}", entry.name, entry.error.as_ref()?.message));
+        let failed = report.entries.iter().filter_map(why).collect();
+        return Ok(library.built(report, failed));
     }
     let tight = check_space(&library.output, space)?;
     if !todo.is_empty() {
@@ -330,7 +339,7 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
                     let (mut entry, mut key) = (EntryReport::new(job), *key);
                     match library.make(job, &mut key, flags, &bars, &mut entry) {
                         Ok(status) => entry.status = status,
-                        Err(error) => entry.fail(Failure::of(&error)),
+                        Err(error) => entry.fail(failure(job, &error)),
                     }
                     lock(&done).push((*at, entry, key));
                     stage.add(1);
@@ -367,6 +376,12 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
     let report =
         LibraryReport { entries, evicted, left_over, pruned, space, warnings, ..LibraryReport::default() };
     Ok(library.built(report, failed))
+}
+
+/// Why a job failed, with the keys of the manifest beside the flags that it is told of.
+fn failure(job: &Job, error: &Error) -> Failure {
+    let failure = Failure::of(error);
+    Failure { message: settings::with_keys(job.kind, &failure.message), ..failure }
 }
 
 impl EntryReport {
@@ -546,14 +561,14 @@ impl Library {
         all
     }
 
-    /// The files of an entry, if they stand in the output as they were written.
-    fn standing_files(&self, job: &Job, key: &Key) -> Option<Vec<StoredFile>> {
+    /// The files of an entry, if they stand in the output as they were written, and what was doubtful about them.
+    fn standing(&self, job: &Job, key: &Key) -> Option<(Vec<StoredFile>, Vec<String>)> {
         let standing = lock(&self.standing).get(&job.folder).cloned()?;
         let folder = self.output.join(&job.folder);
         let stands =
             |(file, stamp): &(StoredFile, Stamp)| Stamp::of(&folder.join(&file.name)).as_ref() == Some(stamp);
         let whole = standing.key == key.hex() && standing.files.iter().all(stands);
-        whole.then(|| standing.files.into_iter().map(|(file, _)| file).collect())
+        whole.then(|| (standing.files.into_iter().map(|(file, _)| file).collect(), standing.warnings))
     }
 
     /// Brings an entry's files to the output, from the cache or by baking them. `key` becomes that of what was baked, where
@@ -669,7 +684,7 @@ impl Library {
         report.warnings = serde_json::from_value(entry.report.clone()).unwrap_or_default();
 
         // What an earlier run left there under other names is of no use.
-        let standing = Standing { key: key.hex(), files };
+        let standing = Standing { key: key.hex(), files, warnings: report.warnings.clone() };
         let old = lock(&self.standing).insert(job.folder.clone(), standing);
         self.is_news.store(true, Ordering::Relaxed);
         for (file, stamp) in old.into_iter().flat_map(|old| old.files) {
@@ -745,27 +760,27 @@ impl Library {
 fn bake_into(output: &Path, job: &Job, snapshot: &Snapshot, bars: &Progress) -> Result<Vec<String>, Error> {
     let silent = Console { quiet: true, bars: Some(bars.of(&job.name)), ..Console::default() };
     let (input, output) = (snapshot.job.input.clone(), output.to_path_buf());
-    let reports = match &snapshot.flags {
+    let of = |reports: Vec<Report>| reports.into_iter().flat_map(|report| report.warnings).collect();
+    let warnings: Result<Vec<String>, Error> = match &snapshot.flags {
         Flags::Bake(flags) => {
             let flags = Args { input, output: Some(output), is_copy: true, ..(**flags).clone() };
             match job.kind {
-                Kind::Mesh => bake_gltf(&flags, &silent).map(|report| vec![report]),
-                _ => bake_folder(&flags, &silent),
+                Kind::Mesh => bake_gltf(&flags, &silent).map(|report| of(vec![report])),
+                _ => bake_folder(&flags, &silent).map(of),
             }
         }
         Flags::Detail(flags) => {
             let flags = SolveArgs { target: input, output: Some(output), ..(**flags).clone() };
-            solve_target(&flags, &silent).map(|_| Vec::new())
+            solve_target(&flags, &silent).map(|report| report.warnings)
         }
         Flags::Skin(flags) => {
             skin_lut::run(&skin_lut::Args { output: Some(output), ..(**flags).clone() }, &silent)
                 .map(|()| Vec::new())
         }
     };
-    let reports: Vec<Report> =
-        reports.map_err(|e| snapshot.as_about_originals(e.about(&snapshot.job.input)))?;
-    let warnings = reports.iter().flat_map(|report| &report.warnings);
-    Ok(warnings.map(|warning| snapshot.original_names(warning)).collect())
+    let warnings = warnings.map_err(|e| snapshot.as_about_originals(e.about(&snapshot.job.input)))?;
+    let told = |warning: &String| settings::with_keys(job.kind, &snapshot.original_names(warning));
+    Ok(warnings.iter().map(told).collect())
 }
 
 /// Moves a finished file, also to another disk.

@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::Error;
 use crate::content::Content;
 use crate::outputs::{WrittenFile, way};
+use crate::values::counted;
 
 /// A file that went in.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -168,13 +169,9 @@ impl Report {
             );
         }
         text.extend(self.curvature.iter().map(super::CurvatureReport::text));
-        let bytes: usize = files().map(|o| o.bytes).sum();
-        text + &format!(
-            "{} files, {:.1} KiB, in {}\n",
-            files().count(),
-            bytes as f64 / 1024.0,
-            folder.display()
-        )
+        let bytes: u64 = self.written.iter().map(|file| file.bytes as u64).sum();
+        let files = counted(self.written.len(), "file", "files");
+        text + &format!("{files}, {:.1} KiB, in {}\n", bytes as f64 / 1024.0, folder.display())
     }
 }
 

@@ -11,6 +11,7 @@ use super::flags::Flag;
 use crate::Error;
 use crate::detail::{BlockFormat, SolveArgs, default_format};
 use crate::skin_lut;
+use crate::values::range_in_words;
 
 #[derive(Parser)]
 #[command(name = "bake", no_binary_name = true)]
@@ -74,7 +75,7 @@ impl Flags {
                 args.encoding(Role::Color, args.color_format),
             ],
             Flags::Detail(args) => {
-                let format = args.format.unwrap_or_else(|| default_format(args.kind.into()));
+                let format = args.format.unwrap_or_else(|| default_format(args.kind()));
                 let masks = args.layer.iter().any(|layer| layer.mask.is_some()).then_some(BlockFormat::Bc7);
                 let formats = [Some(format), args.tile_format, masks].into_iter().flatten();
                 formats.map(BlockFormat::encoding).collect()
@@ -115,6 +116,8 @@ pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestErr
     // Files that are not in the entry's folder are beside the manifest, not where the program was started.
     if job.kind == Kind::Detail {
         let mut args = DetailFlags::try_parse_from(all).map_err(wrong)?.args;
+        // Its name tells what it holds.
+        args.target.clone_from(&job.input);
         for layer in &mut args.layer {
             layer.tile = manifest.beside(&layer.tile);
             layer.mask = layer.mask.as_ref().map(|mask| manifest.beside(mask));
@@ -244,13 +247,69 @@ fn unknown(command: &clap::Command, name: &str) -> String {
     }
     let mut names: Vec<&str> =
         command.get_arguments().filter_map(clap::Arg::get_long).filter(|long| !is_of_the_run(long)).collect();
+    let plain = name.trim_start_matches('-').replace('_', "-").to_lowercase();
+    if let Some(meant) = ["input", "exclude", "output"].iter().chain(&names).find(|known| **known == plain) {
+        return format!("unknown key `{name}`; did you mean `{meant}`?");
+    }
+    if is_of_the_run(&plain) {
+        return format!("`{name}` says what a run does; give it on the command line as --{plain}");
+    }
     names.sort_unstable();
     format!("unknown key `{name}`; expected input, exclude, output, or a flag: {}", names.join(", "))
+}
+
+/// A message about an entry: where it names flags, the keys of the manifest that stand for them too.
+pub(super) fn with_keys(kind: Kind, message: &str) -> String {
+    let command = command(kind);
+    let words: Vec<&str> = message.split_whitespace().collect();
+    let bare = |word: &str| {
+        word.trim_matches(|c: char| !c.is_alphanumeric() && !"-_=./".contains(c))
+            .trim_end_matches('.')
+            .to_owned()
+    };
+    let mut keys: Vec<String> = Vec::new();
+    for (i, word) in words.iter().enumerate() {
+        let given = bare(word);
+        let Some(flag) = given.strip_prefix("--") else { continue };
+        let (name, joined) = flag.split_once('=').map_or((flag, None), |(name, value)| (name, Some(value)));
+        let Some(argument) = command.get_arguments().find(|a| a.get_long() == Some(name)) else { continue };
+        if is_of_the_run(name) {
+            continue;
+        }
+        let key = if matches!(argument.get_action(), ArgAction::SetTrue) {
+            format!("`{name} = true`")
+        } else {
+            let ends = !word.ends_with(|c: char| c.is_alphanumeric());
+            let next = joined.map(str::to_owned).or_else(|| Some(bare(words.get(i + 1)?)).filter(|_| !ends));
+            // The next word is a value only where the flag takes it, and not whatever there is.
+            let takes = |value: &str| try_word(kind, name, &format!("--{name}={value}")).is_ok();
+            let is_value = |value: &String| {
+                !value.is_empty() && takes(value) && (value.contains('=') || !takes("no such value"))
+            };
+            match next.filter(is_value) {
+                Some(value) => format!("`{name} = \"{value}\"`"),
+                None => format!("`{name}`"),
+            }
+        };
+        if !keys.contains(&key) {
+            keys.push(key);
+        }
+    }
+    let valued = keys.clone();
+    keys.retain(|key| {
+        let begin = format!("{} = ", key.trim_end_matches('`'));
+        !valued.iter().any(|other| other.starts_with(&begin))
+    });
+    match keys.as_slice() {
+        [] => message.to_owned(),
+        keys => format!("{message} (in the manifest: {})", keys.join(", ")),
+    }
 }
 
 /// A flag error without the words that are about command lines.
 fn reason(error: &clap::Error) -> String {
     let text = error.to_string();
     let about = text.split("\n\n").next().unwrap_or("");
-    about.trim_start_matches("error: ").split_whitespace().collect::<Vec<_>>().join(" ")
+    let about = about.trim_start_matches("error: ").split_whitespace().collect::<Vec<_>>().join(" ");
+    range_in_words(&about)
 }

@@ -1,7 +1,7 @@
 //! The page with everything that the demo made.
 
 use super::Shown;
-use crate::compare::{LEGEND, Ranking};
+use crate::compare::{Ranking, footnote};
 use crate::page;
 
 /// HTML that shows `materials`, by links relative to its own place.
@@ -66,9 +66,10 @@ fn numbers(shown: &Shown) -> String {
     let says = findings.iter().map(|finding| format!("<li>{}\n", finding.says));
     format!(
         "<div class=\"scroll\">\n<table>\n<tr><th>filter{headings}\n{}<tr class=\"faint\"><td>noise{}\n</table>\n</div>\n\
-         <ul>\n{}</ul>\n<p>{LEGEND}</p>\n",
+         <ul>\n{}</ul>\n<p>{}</p>\n",
         rows.collect::<String>(),
         noise.collect::<String>(),
-        says.collect::<String>()
+        says.collect::<String>(),
+        footnote(findings)
     )
 }

@@ -203,7 +203,8 @@ pub(super) fn run(args: &LibraryArgs, console: &Console) -> Result<(), Error> {
     check_folder(&output)?;
     refuse_other_page(&output.join("index.html"))?;
     let report = report_library(args, console)?;
-    console.result(&report, &text(&report))?;
+    let pages = ["index.html", "report.json"].map(|file| output.join(file).display().to_string());
+    console.result(&report, &format!("{}wrote {}\n", text(&report), pages.join(", ")))?;
     tell_place(console, args.output.as_deref(), &output);
     Ok(())
 }
@@ -476,14 +477,10 @@ fn read_materials(args: &LibraryArgs, console: &Console) -> Result<Vec<Material>
 fn read_maps(folder: &Path, args: &LibraryArgs) -> Result<Vec<MapFile>, Error> {
     let mut maps: Vec<MapFile> = Vec::new();
     for (file, role, green) in named_maps(folder)? {
-        let kind = match role {
-            Role::Color => MapKind::Color,
-            Role::Normal => MapKind::Normal,
-            Role::Roughness | Role::Gloss | Role::Occlusion | Role::Metallic | Role::Specular => {
-                MapKind::Data
-            }
-            Role::Aniso => MapKind::Aniso,
-            Role::Height => MapKind::Data,
+        let kind = match KindName::of_role(role) {
+            // Several quantities of one file would be painted by a guide of one.
+            Some(kind) if !role.is_packed() => kind.into(),
+            None if role == Role::Height => MapKind::Data,
             _ => continue,
         };
         let guide = matches!(role, Role::Height | Role::Occlusion);

@@ -65,7 +65,7 @@ pub(super) fn write(
         Some(model) => (Document::open_allowing(model, args.trust.allowed()?)?, output(args, model)),
         None => {
             let size = (target.levels[0].width, target.levels[0].height);
-            let board = board(stem, MapKind::from(args.kind), size);
+            let board = board(stem, args.kind(), size);
             (Document::from_bytes(Path::new("board.glb"), &board)?, args.output().join(format!("{stem}.glb")))
         }
     };
@@ -104,7 +104,7 @@ fn output(args: &SolveArgs, model: &Path) -> PathBuf {
 
 /// The map that is blended, and the slots that hold the target for those who do not blend.
 fn place(args: &SolveArgs, target: &Target) -> (DetailMap, Vec<Slot>) {
-    match MapKind::from(args.kind) {
+    match args.kind() {
         MapKind::Color => (DetailMap::BaseColor, vec![Slot::BaseColor]),
         MapKind::Normal => (DetailMap::Normal, vec![Slot::Normal]),
         MapKind::Aniso => (DetailMap::Aniso, Vec::new()),

@@ -8,6 +8,7 @@ use kinran_bake::detail::{
     Comparison, DetailOptions, FADE_TRIALS, Layer, LayerTransform, LevelError, MapKind, Mask, Resolution,
     Solved, Target, Tile, TileOptions, bearable_opacity, compare, level_pictures, lowest_resolution, solve,
 };
+use kinran_bake::folder::{Green, guess_green, named_role, not_normals};
 use kinran_image::{
     Image, encode_dds, encode_ktx2, encode_png, image_size, read_image, read_texture, write_atomically,
 };
@@ -16,7 +17,7 @@ use serde::Serialize;
 
 use super::layer_flag::layer_flag;
 use super::model::{self, Written, channels_flag};
-use super::{BlockFormat, KindName, LayerFlag, default_format};
+use super::{BlockFormat, KindName, KindSource, LayerFlag, default_format};
 use crate::bake::{Container, PresetName};
 use crate::content::Content;
 use crate::model::ModelArgs;
@@ -63,9 +64,9 @@ pub struct SolveArgs {
     #[arg(long, short, value_name = "DIR")]
     pub output: Option<PathBuf>,
 
-    /// What the target and its tiles hold
-    #[arg(long, value_enum, default_value_t)]
-    pub kind: KindName,
+    /// What the target and its tiles hold [default: what the target's name says, else color]
+    #[arg(long, value_enum)]
+    pub kind: Option<KindName>,
 
     /// Format of the synthesized map [default: bc7, for normals bc5]
     #[arg(long, value_enum)]
@@ -165,6 +166,19 @@ impl SolveArgs {
     pub(super) fn output(&self) -> PathBuf {
         self.output.clone().unwrap_or_else(|| beside(&self.target, "baked"))
     }
+
+    /// What the target holds, and what says so.
+    fn named_kind(&self) -> (KindName, KindSource) {
+        let by_flag = self.kind.map(|kind| (kind, KindSource::Flag));
+        by_flag
+            .or_else(|| Some((KindName::of_file(&self.target)?, KindSource::Name)))
+            .unwrap_or((KindName::Color, KindSource::Assumed))
+    }
+
+    /// What the target holds: by flag, else by its name, else colour.
+    pub(crate) fn kind(&self) -> MapKind {
+        self.named_kind().0.into()
+    }
 }
 
 /// What was solved and how well.
@@ -172,6 +186,10 @@ impl SolveArgs {
 pub struct SolveReport {
     /// File name of the target.
     pub target: String,
+    /// What it holds.
+    pub kind: KindName,
+    /// What says so.
+    pub kind_source: KindSource,
     /// Files written.
     pub files: Vec<String>,
     /// The same with their hashes: a later run writes these again, and no others, without a question.
@@ -191,12 +209,15 @@ pub struct SolveReport {
     /// For `--compare`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub comparison: Option<Comparison>,
+    /// What is doubtful about the target and its layers, a sentence each.
+    pub warnings: Vec<String>,
 }
 
 pub(super) fn run(args: &SolveArgs, console: &Console) -> Result<(), Error> {
     check_folder(&args.output())?;
     let report = solve_target(args, console)?;
-    console.result(&report, &text(&report))?;
+    report.warnings.iter().for_each(|warning| console.warn(warning));
+    console.result(&report, &text(&report, &args.output()))?;
     tell_place(console, args.output.as_deref(), &args.output());
     Ok(())
 }
@@ -217,7 +238,7 @@ fn tile_keys(args: &SolveArgs) -> BTreeSet<TileKey> {
 
 /// Bytes that the files will take, by the headers of the images alone.
 pub(crate) fn space(args: &SolveArgs) -> Space {
-    let format = args.format.unwrap_or_else(|| default_format(args.kind.into()));
+    let format = args.format.unwrap_or_else(|| default_format(args.kind()));
     let texture = |format: BlockFormat, file: &Path| {
         let size = image_size(file)?;
         Some(Space::of_texture(args.container, args.zstd, format.encoding().format, size))
@@ -287,7 +308,8 @@ const PICTURES: [&str; 7] =
 /// Whatever is wrong with a file or a flag; each names the file.
 pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, Error> {
     check(args, console)?;
-    let kind = MapKind::from(args.kind);
+    let (kind_name, kind_source) = args.named_kind();
+    let kind = MapKind::from(kind_name);
     let format = args.format.unwrap_or_else(|| default_format(kind));
     let mut options = DetailOptions::new(format.encoding());
     if let Some(preset) = args.preset {
@@ -302,9 +324,19 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     }
 
     // First, since compressing tiles takes a while.
-    let target =
-        named(&args.target, read_image(&args.target).and_then(|i| Target::new(&i, kind, args.y_down)))?;
-    let tiles = read_tiles(args, kind, args.tile_format.unwrap_or(format), console)?;
+    let image = read_image(&args.target)?;
+    if kind_source == KindSource::Assumed && not_normals(&image).is_none() {
+        let reason = "nothing says what the target holds, and its texels look like normals; give --kind normal, or --kind \
+                      color where they are none";
+        return Err(Error::flag_error_of(&args.target, "--kind", reason));
+    }
+    let mut warnings = layer_kinds(args, kind_name);
+    if kind == MapKind::Normal {
+        warnings.extend(green_doubt(&args.target, &image, args.y_down, "--y-down"));
+    }
+    let target = named(&args.target, Target::new(&image, kind, args.y_down))?;
+    drop(image);
+    let tiles = read_tiles(args, kind, args.tile_format.unwrap_or(format), console, &mut warnings)?;
     let tile = |file: &Path, y_down: bool, is_mask: bool| &tiles[&(file.to_path_buf(), y_down, is_mask)];
     let mut layers: Vec<Layer> = args
         .layer
@@ -405,6 +437,8 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     let written = files.iter().map(|file| WrittenFile::of(&args.output(), file)).collect::<Result<_, _>>()?;
     let report = SolveReport {
         target: file_name(&args.target),
+        kind: kind_name,
+        kind_source,
         files,
         written,
         target_size: [size.0, size.1],
@@ -413,6 +447,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         levels: solved.levels,
         resolutions,
         comparison,
+        warnings,
     };
     let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
     write_atomically(&args.output().join(format!("{stem}.detail.json")), &json)?;
@@ -424,6 +459,7 @@ fn read_tiles(
     kind: MapKind,
     format: BlockFormat,
     console: &Console,
+    warnings: &mut Vec<String>,
 ) -> Result<Tiles, Error> {
     let mut tiles = Tiles::new();
     for flag in &args.layer {
@@ -443,6 +479,9 @@ fn read_tiles(
                     ..TileOptions::new(kind, encoding)
                 };
                 read_image(file).and_then(|image| {
+                    if kind == MapKind::Normal {
+                        warnings.extend(green_doubt(file, &image, y_down, "y-down of the layer"));
+                    }
                     let texels = u64::from(image.width) * u64::from(image.height) * 4 / 3;
                     let stage = console.progress().stage(format!("compressing {}", file_name(file)), texels);
                     Tile::bake(&image, options, &|n| stage.add(n))
@@ -457,6 +496,40 @@ fn read_tiles(
         }
     }
     Ok(tiles)
+}
+
+/// A sentence for each layer whose name says another kind than the target's.
+fn layer_kinds(args: &SolveArgs, kind: KindName) -> Vec<String> {
+    let tiles: BTreeSet<&PathBuf> = args.layer.iter().map(|layer| &layer.tile).collect();
+    let others = tiles.into_iter().filter_map(|tile| Some((tile, KindName::of_file(tile)?)));
+    let doubts = others.filter(|(_, own)| *own != kind).map(|(tile, own)| {
+        format!(
+            "{}: its name says {}, and it is laid under a target of kind {}; take the tile's {} map, or say --kind",
+            tile.display(),
+            own.name(),
+            kind.name(),
+            kind.name()
+        )
+    });
+    doubts.collect()
+}
+
+/// A sentence on normals whose green points the other way than is said, by their name or clearly by their slopes.
+fn green_doubt(file: &Path, image: &Image, y_down: bool, flag: &str) -> Option<String> {
+    let said = if y_down { Green::Down } else { Green::Up };
+    let name = named_role(file).and_then(|(_, green)| green);
+    let who = if name.is_some_and(|green| green != said) {
+        "its name says"
+    } else if name.is_none() && guess_green(image).contradicts(said) {
+        "its slopes say"
+    } else {
+        return None;
+    };
+    let (way, fix) = match said {
+        Green::Up => ("down (DirectX)", "give"),
+        Green::Down => ("up (OpenGL)", "leave out"),
+    };
+    Some(format!("{}: {who} that green points {way}; then {fix} {flag}", file.display()))
 }
 
 /// An error that lacks a file's name gets it.
@@ -529,7 +602,7 @@ fn file_name(path: &Path) -> String {
 }
 
 /// The report for people.
-fn text(report: &SolveReport) -> String {
+fn text(report: &SolveReport, folder: &Path) -> String {
     let mut rows = vec![["level", "size", "blended error", "not reached"].map(String::from).to_vec()];
     if report.comparison.is_some() {
         rows[0].extend(["target alone", "the talk's", "plain overlay", "uncompensated"].map(String::from));
@@ -547,17 +620,23 @@ fn text(report: &SolveReport) -> String {
         }
         rows.push(row);
     }
-    let mut text = table(&rows);
+    let source = match report.kind_source {
+        KindSource::Flag => "by --kind",
+        KindSource::Name => "by the target's name",
+        KindSource::Assumed => "assumed, since the target's name says nothing; --kind says otherwise",
+    };
+    let mut text = format!("kind {}, {source}\n{}", report.kind.name(), table(&rows));
     if let Some(c) = &report.comparison {
         text += &format!(
             "synthesized {} bytes, shared tiles {}; the target alone {}, a unique map as fine as the tiles {}\n",
             c.synthesized_bytes, c.shared_bytes, c.target_bytes, c.unique_bytes
         );
     }
-    text += "error: root mean square against the target, in steps of 8 bits, of normals in degrees; not reached: texels that no \
+    text += "blended error: root mean square against the target, in steps of 8 bits, of normals in degrees; not reached: texels that no \
              synthesized map turns into the target\n";
     if let Some(opacity) = report.opacity {
         text += &format!("opacity of the layers: x {opacity}\n");
     }
-    text + &format!("wrote {}\n", report.files.join(", "))
+    let json = format!("{}.detail.json", file_stem(Path::new(&report.target)));
+    text + &format!("wrote {} and {json}, in {}\n", report.files.join(", "), folder.display())
 }

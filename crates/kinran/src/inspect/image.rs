@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::statistics::Range;
 use crate::table::{list, table};
+use crate::values::counted;
 use crate::view::file_name;
 use crate::{Console, Error};
 
@@ -113,7 +114,14 @@ fn text(report: &Report) -> String {
     let mut facts = vec![
         row("file", report.file.clone()),
         row("size", format!("{}x{}", report.width, report.height)),
-        row("samples", format!("{} channels of {}-bit {kind}", report.channels.len(), report.bits)),
+        row(
+            "samples",
+            format!(
+                "{} of {}-bit {kind}",
+                counted(report.channels.len(), "channel", "channels"),
+                report.bits
+            ),
+        ),
     ];
     let color = match report.transfer.as_str() {
         "unsaid" => "sRGB, if it is colour",

@@ -13,6 +13,7 @@ use crate::bake::normal_remarks;
 use crate::model::{ModelArgs, read_scene};
 use crate::render::triangles;
 use crate::table::list;
+use crate::values::counted;
 use crate::view::file_name;
 use crate::{Console, Error, outputs};
 
@@ -164,7 +165,10 @@ fn bake(scene: &Scene, material: usize) -> String {
                 (None, _) => "roughness and anisotropy",
                 (Some(_), _) => "normal and anisotropy",
             };
-            format!("{what}, {width}x{height}, {} levels", full_level_count(width, height))
+            format!(
+                "{what}, {width}x{height}, {}",
+                counted(full_level_count(width, height), "level", "levels")
+            )
         }
         Err(NoSurface::Plain) => "nothing: it has no normal or roughness map and is isotropic".into(),
         Err(NoSurface::Apart(reason)) => format!("nothing: {reason}"),
@@ -176,7 +180,10 @@ fn text(report: &Report) -> String {
     let or_none = |values: &[String]| if values.is_empty() { "none".into() } else { values.join(", ") };
     let mut facts = vec![
         row("file", report.file.clone()),
-        row("triangles", format!("{} in {} instances", report.triangles, report.instances)),
+        row(
+            "triangles",
+            format!("{} in {}", report.triangles, counted(report.instances, "instance", "instances")),
+        ),
         row("extensions", or_none(&report.extensions_used)),
     ];
     if !report.extensions_required.is_empty() {

@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use crate::outputs::{WrittenFile, bytes_text};
 use crate::table::list;
+use crate::values::counted;
 use crate::view::file_name;
 use crate::{Console, Error};
 
@@ -112,7 +113,7 @@ fn members(json: &Value) -> Vec<Member> {
         Value::Array(list) if list.iter().all(Value::is_number) && list.len() <= 4 => {
             Some(list.iter().map(Value::to_string).collect::<Vec<_>>().join(" x "))
         }
-        Value::Array(list) => Some(format!("{} entries", list.len())),
+        Value::Array(list) => Some(counted(list.len(), "entry", "entries")),
         Value::Object(_) | Value::Null => None,
     };
     shown.filter_map(|(name, v)| Some(Member { name: name.clone(), value: value(v)? })).collect()

@@ -11,6 +11,7 @@ use super::statistics::Statistics;
 use crate::content::Content;
 use crate::outputs::bytes_text;
 use crate::table::{list, table};
+use crate::values::counted;
 use crate::view::file_name;
 use crate::{Console, Error};
 
@@ -102,10 +103,10 @@ fn text(report: &Report) -> String {
         row(
             "size",
             format!(
-                "{}x{}, {} levels, {}",
+                "{}x{}, {}, {}",
                 report.width,
                 report.height,
-                report.levels.len(),
+                counted(report.levels.len(), "level", "levels"),
                 bytes_text(report.texture_bytes)
             ),
         ),

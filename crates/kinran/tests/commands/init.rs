@@ -42,6 +42,10 @@ fn what_init_writes_is_baked_as_it_stands() {
     material(&root.join(".hidden"), "hidden");
     std::fs::create_dir_all(root.join("notes")).unwrap();
     std::fs::write(root.join("notes/readme.txt"), "nothing").unwrap();
+    // Nothing at all, and pictures that are no maps.
+    std::fs::create_dir_all(root.join("later")).unwrap();
+    grey(&root.join("photos/left.png"));
+    grey(&root.join("photos/right.png"));
     // Two models, one with its map beside it, and one that is torn.
     std::fs::create_dir_all(root.join("props")).unwrap();
     std::fs::write(root.join("props/lamp.glb"), glb()).unwrap();
@@ -68,7 +72,9 @@ fn what_init_writes_is_baked_as_it_stands() {
     assert_eq!(counts, [4, 2, 2], "{written}");
     let left_out: Vec<&str> =
         report["left_out"].as_array().unwrap().iter().map(|left| left["path"].as_str().unwrap()).collect();
-    for path in ["materials/odd", "props/torn.glb", "props/cow.obj", "targets/boot_color.png"] {
+    for path in
+        ["materials/odd", "props/torn.glb", "props/cow.obj", "targets/boot_color.png", "later", "photos"]
+    {
         assert!(left_out.contains(&path) && written.contains(&format!("# {path}: ")), "{path}: {written}");
     }
     assert!(!written.contains("hidden") && !written.contains("done"), "{written}");

@@ -10,3 +10,4 @@ mod render;
 mod shaders;
 mod shape;
 mod trust;
+mod words;

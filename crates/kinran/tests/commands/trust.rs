@@ -64,7 +64,10 @@ impl Models {
             &["compare", &model, "-o", &out],
             &["skin", &model, "-o", &out],
             &["fuzz", &model, "-o", &out],
-            &["detail", "solve", &target, "--layer", &layer, "-o", &out, "--model", &model],
+            &[
+                "detail", "solve", &target, "--kind", "color", "--layer", &layer, "-o", &out, "--model",
+                &model,
+            ],
         ];
         let drawn = ["render", "skin", "fuzz"];
         let words = words.map(|words| {
@@ -424,7 +427,7 @@ fn a_library_does_not_know_what_it_will_take() {
     let entries = [
         "[[aniso]]\ninput = \"maps/a\"\nform = \"both\"\ncontainer = \"both\"\n",
         "[[mesh]]\ninput = \"square.glb\"\nall-textures = true\n",
-        "[[detail]]\ninput = \"maps/tile.png\"\nlayer = [\"maps/a/a_color.png\"]\npictures = true\n",
+        "[[detail]]\ninput = \"maps/tile.png\"\nkind = \"color\"\nlayer = [\"maps/a/a_color.png\"]\npictures = true\n",
         "[[skin]]\nsize = \"64x64\"\npenumbra = true\n",
     ];
     let manifest = place("kinran.toml");

@@ -45,7 +45,7 @@ pub(super) fn watch(args: &Args, console: &Console) -> Result<(), Error> {
         let quiet = matches!(&result, Ok(built) if !built.is_news());
         if !quiet && said != last {
             match &result {
-                Ok(built) => built.tell(console)?,
+                Ok(built) => built.tell(console, last.is_empty())?,
                 Err(error) => console.failure(error),
             }
         }

@@ -1,0 +1,85 @@
+//! Words that people read: of files that are not there, of what cannot be read, of one and of several.
+
+use kinran_image::write_png;
+
+use crate::common::{bumps, glb, kinran, refused, square, text};
+
+#[test]
+fn a_missing_file_is_told_in_a_way_of_each_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| text(&folder.path().join(name)).to_owned();
+    let (image, model) = (path("nope.png"), path("nope.glb"));
+    let (home, manifest) = (path("nope"), path("nope.toml"));
+    let told = |name: &str| format!("{name}: there is no such file or folder");
+    for (words, missing) in [
+        (vec!["render", &model, "-o", &image], &model),
+        (vec!["bake", &model], &model),
+        (vec!["bake", &home], &home),
+        (vec!["bake", &manifest], &manifest),
+        (vec!["compare", &model], &model),
+        (vec!["skin", &model], &model),
+        (vec!["fuzz", &model], &model),
+        (vec!["inspect", &image], &image),
+        (vec!["inspect", &model], &model),
+        (vec!["init", &home], &home),
+        (vec!["detail", "solve", &image, "--layer", &image], &image),
+        (vec!["detail", "report", &home], &home),
+    ] {
+        refused(&words, &[&told(missing)]);
+    }
+}
+
+#[test]
+fn what_is_no_model_is_called_broken() {
+    let folder = tempfile::tempdir().unwrap();
+    for (command, name) in [("skin", "ball.stl"), ("render", "x.png"), ("compare", "x.fbx")] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, "solid ball").unwrap();
+        let (_, extension) = name.split_once('.').unwrap();
+        let wanted = format!("{name}: `.{extension}` is not read; give .glb, .gltf or .obj");
+        refused(&[command, text(&path)], &[&wanted]);
+    }
+}
+
+#[test]
+fn a_model_that_was_written_is_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bare.glb");
+    // A name of the same length that means nothing.
+    let bytes = glb();
+    let at = bytes.windows(13).position(|word| word == b"normalTexture").unwrap();
+    let bare = [&bytes[..at], b"anormalThings", &bytes[at + 13..]].concat();
+    std::fs::write(&path, bare).unwrap();
+    let said = kinran(&["bake", text(&path), "-o", text(&folder.path().join("out"))]);
+    assert_eq!(said.code, Some(0), "{}", said.err);
+    assert!(said.out.contains("1 file, ") && !said.out.contains("0.0 KiB"), "{}", said.out);
+}
+
+#[test]
+fn one_is_told_as_many_and_what_is_not_marked_as_marked() {
+    let (folder, model) = square();
+    let picture = folder.path().join("a.png");
+    let said = kinran(&["render", text(&model), "-o", text(&picture), "--size", "8", "--spp", "1"]);
+    assert!(said.out.contains(" 1 sample a pixel, 2 triangles"), "{}{}", said.out, said.err);
+
+    let few = ["render", text(&model), "-o", text(&picture), "--spp", "0"];
+    refused(&few, &["--spp", "0 is not from 1 to 1048576"]);
+
+    let out = folder.path().join("out");
+    let few = ["--size", "8", "--distances", "1", "--filters", "ml"];
+    let said = kinran(&[&["compare", text(&model), "-o", text(&out)], &few[..]].concat());
+    assert_eq!(said.code, Some(0), "{}", said.err);
+    assert!(!said.out.contains("is marked") && said.out.contains("\"Noise\""), "{}", said.out);
+}
+
+#[test]
+fn a_report_lies_nobody_knows_where() {
+    let folder = tempfile::tempdir().unwrap();
+    let (library, out) = (folder.path().join("library"), folder.path().join("out"));
+    std::fs::create_dir_all(library.join("tin")).unwrap();
+    write_png(&library.join("tin/tin_color.png"), &bumps()).unwrap();
+    let few = ["--size", "16", "--format", "bc1", "--no-pictures"];
+    let said = kinran(&[&["detail", "report", text(&library), "-o", text(&out)], &few[..]].concat());
+    let wanted = format!("wrote {}, ", out.join("index.html").display());
+    assert!(said.out.contains(&wanted), "wanted {wanted} in {}{}", said.out, said.err);
+}
