@@ -520,7 +520,7 @@ fn a_material_of_another_folder_takes_the_place_of_one() {
         (at("a"), at("b"), "cloth.kinran.json"),
         (at("a").join(model), at("b").join(model), "square.kinran.json"),
     ] {
-        let out = first.is_dir().then(|| at("baked")).unwrap_or_else(|| at("models"));
+        let out = if first.is_dir() { at("baked") } else { at("models") };
         let bake = |source: &Path, flags: &[&str]| {
             let said = kinran(&[&["bake", text(source), "-o", text(&out)], flags].concat());
             assert_eq!(said.code, Some(0), "{}", said.err);
