@@ -1111,7 +1111,7 @@ fn missing_folders_and_files_in_their_place_are_named() {
     let dir = folder_of(&["a.png"]);
     let gone = dir.path().join("gone");
     let error = scan(&gone, &Hints::default()).unwrap_err().to_string();
-    assert!(error.contains("gone") && error.contains("check that"), "{error}");
+    assert!(error.contains("gone") && error.contains("there is no such file or folder"), "{error}");
     let error = scan(&dir.path().join("a.png"), &Hints::default()).unwrap_err().to_string();
     assert!(error.contains("a.png") && error.contains("not a folder"), "{error}");
 }
@@ -1124,7 +1124,7 @@ fn damaged_and_vanished_files_are_named() {
     assert!(error.contains("a_normal.png") && error.contains("empty"), "{error}");
     fs::remove_file(dir.path().join("a_normal.png")).unwrap();
     let error = folder.materials[0].load().unwrap_err().to_string();
-    assert!(error.contains("a_normal.png") && error.contains("check that"), "{error}");
+    assert!(error.contains("a_normal.png") && error.contains("there is no such file or folder"), "{error}");
 }
 
 #[cfg(unix)]
