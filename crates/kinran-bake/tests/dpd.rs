@@ -82,7 +82,7 @@ fn the_integral_of_a_lobes_power_is_another_one() {
 }
 
 /// On flat footprints of two kinds of texels the filter ends near the least divergence: its two steps leave up to a tenth
-/// of alpha, and a lobe that is farther off is another one. The likelihood's lobe is.
+/// of alpha. Microfacets in the same directions in every texel would miss it on threads: by 11 % at 25 degrees, 13 % at 40.
 #[test]
 fn the_lobe_of_least_divergence_is_another_one() {
     let turned = |alphas: (f32, f32), degrees: f32| {
@@ -93,6 +93,7 @@ fn the_lobe_of_least_divergence_is_another_one() {
         ("alpha 0.1 and 0.3", Sym2::scalar(0.01), Sym2::scalar(0.09)),
         ("alpha 0.2 and 0.25", Sym2::scalar(0.04), Sym2::scalar(0.0625)),
         ("threads at 25 degrees", turned((0.5, 0.1), 25.0), turned((0.5, 0.1), -25.0)),
+        ("threads at 40 degrees", turned((0.5, 0.1), 40.0), turned((0.5, 0.1), -40.0)),
         ("threads at 10 degrees", turned((0.4, 0.15), 10.0), turned((0.4, 0.15), -10.0)),
     ] {
         let texels: Vec<Surface> =

@@ -60,7 +60,7 @@ fn means(footprints: &[Vec<Surface>]) -> Vec<(Filter, Means)> {
 
 /// The maximum-likelihood filter was measured elsewhere to take 26 %, 25 % and 16 % off the talk's error on
 /// three sets like these; here it must take 23 % off each set (it takes 25 or 26) and be better on nearly every footprint.
-/// The density power divergence must take another 7 % off that (prototypes: 6 to 10), without more error in L1 or in the
+/// The density power divergence must take another 7 % off that (it takes 10), without more error in L1 or in the
 /// microfacets.
 #[test]
 fn the_fits_lose_their_lead_over_the_talks_filter() {

@@ -252,20 +252,22 @@ fn microfacets_line_up_with_threads() {
     }
 }
 
-/// The likelihood's optimum for equal parts of two isotropic alphas is their geometric mean, exactly; sixteen
-/// points and a little of the linear result stand for it within 6 %.
+/// The likelihood's optimum for equal parts of two isotropic alphas is their geometric mean, exactly, which counts as far as
+/// the mean of their squares, the linear result, is smooth; sixteen points stand for a lobe within 2 %.
 #[test]
 fn a_mix_of_two_roughnesses_is_not_their_geometric_mean() {
-    for (a, b) in [(0.1, 0.3), (0.2, 0.25), (0.1, 0.2), (0.2, 0.6), (0.05, 0.6)] {
+    for (a, b) in [(0.1, 0.3), (0.2, 0.25), (0.1, 0.2), (0.2, 0.6), (0.3, 0.9), (0.05, 0.6_f32)] {
         let texels: Vec<Surface> = (0..16)
             .map(|i| (Vec3::Z, Sym2::scalar(if (i % 4 + i / 4) % 2 == 0 { a * a } else { b * b })))
             .collect();
         let (n, s) = filtered(&texels, 4, Filter::Ml);
         let (l1, l2, _) = s.eigen();
-        let wanted = (a * b).sqrt();
+        let linear = 0.5 * (a * a + b * b);
+        let kept = (1.0 - linear) / (1.0 - linear + (linear / 0.4).powi(5));
+        let wanted = (linear + kept * (a * b - linear)).sqrt();
         println!("{a} and {b}: wanted {wanted}, got {} and {}", l1.sqrt(), l2.sqrt());
         let off = (l1.sqrt() / wanted - 1.0).abs().max((l2.sqrt() / wanted - 1.0).abs());
-        assert!(off < 0.06, "{a} and {b}: wanted {wanted}, got {} and {}", l1.sqrt(), l2.sqrt());
+        assert!(off < 0.02, "{a} and {b}: wanted {wanted}, got {} and {}", l1.sqrt(), l2.sqrt());
         assert!(n.distance(Vec3::Z) < 1e-6, "{a} and {b}: normal {n}");
     }
 }
