@@ -33,6 +33,7 @@ pub use folder::bake_folder;
 pub use gltf::bake_gltf;
 pub(crate) use gltf::normal_remarks;
 pub use library::{CACHE_LIMIT, LibraryArgs, LibraryReport, bake_library, cache_folder};
+pub(crate) use report::format_name;
 pub use report::{Input, Output, Report, SurfaceReport};
 
 /// Bakes a folder of authored maps, a glTF file or a whole library into textures with right mips
@@ -68,8 +69,8 @@ pub struct Args {
     #[arg(long, short, value_name = "DIR")]
     pub output: Option<PathBuf>,
 
-    /// How a footprint becomes one texel: ml, dpd, linear (the talk), param, lean or naive
-    #[arg(long, value_name = "NAME", default_value = "ml", value_parser = filter)]
+    /// How a footprint becomes one texel; linear is the talk's
+    #[arg(long, value_name = "NAME", default_value = "ml", value_parser = filter())]
     pub filter: Filter,
 
     /// Shape of the footprint
@@ -96,7 +97,7 @@ pub struct Args {
     #[arg(long, value_enum, value_name = "FORMAT")]
     pub normal_format: Option<FormatName>,
 
-    /// Format of aniso, roughness and anisotropy maps [default: bc7]
+    /// Format of aniso, anisotropy, roughness and orm maps [default: bc7]
     #[arg(long, value_enum, value_name = "FORMAT")]
     pub aniso_format: Option<FormatName>,
 

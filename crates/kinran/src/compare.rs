@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::compare_sheet::{comparison_sheet, distance_sheet};
-use crate::model::read_scene;
+use crate::model::{model_at, read_scene};
 use crate::picture::Picture;
 use crate::ranking::{Errors, FLIP_BEND, Order, order};
 use crate::surfaces::{Mips, scene_surfaces};
@@ -47,9 +47,9 @@ pub struct Args {
     #[arg(long, short, value_name = "DIR")]
     pub output: Option<PathBuf>,
 
-    /// Filters, in the order of the columns: ml, dpd, linear, param, lean, naive
+    /// Filters, in the order of the columns
     #[arg(long, value_name = "A,B,C", value_delimiter = ',', default_value = "ml,linear,lean,naive",
-        value_parser = filter)]
+        value_parser = filter())]
     pub filters: Vec<Filter>,
 
     /// Samples in a pixel of the filters' pictures at distance 1; farther away they have as many times more
@@ -227,8 +227,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         series.flat_map(|name| args.distances.iter().map(move |distance| picture_file(name, *distance)));
     let pictures = pictures.chain(["compare.png".into(), "distance.png".into()]);
     args.view.refuse_inputs(&args.file, pictures.map(|picture| output.join(picture)))?;
-    let scene = read_scene(&args.file, &args.view.model, &Needs::ALL, &console.progress())?;
-    let view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
+    let file = model_at(&args.file)?;
+    let scene = read_scene(&file, &args.view.model, &Needs::ALL, &console.progress())?;
+    let view = View::new(&scene, &file.to_string_lossy(), &args.view)?;
     let options = Options {
         filters: distinct(&args.filters),
         samples_per_pixel: args.spp,
@@ -238,7 +239,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         distances: distinct(&args.distances),
         view,
     };
-    let comparison = compare(&scene, &file_name(&args.file), &options, &console.progress())?;
+    let comparison = compare(&scene, &file_name(&file), &options, &console.progress())?;
     comparison.report.warnings.iter().for_each(|w| console.warn(w));
     comparison.write(&output)?;
     let text = format!("{}\nPictures and numbers are in {}", comparison.table(), output.display());
@@ -316,7 +317,7 @@ pub fn compare(
     let (surfaces, apart) = scene_surfaces(scene, Mips::Level0, progress)?;
     let told = scene.warnings.iter().chain(options.view.environment_notes()).cloned();
     let warnings = told.chain(apart).collect();
-    let mut prepared = options.view.scene(scene, surfaces)?;
+    let mut prepared = options.view.scene(scene, surfaces, progress)?;
     let mut truth = Vec::new();
     let mut drawn: Vec<Vec<Taken>> = vec![Vec::new(); options.filters.len()];
     let mut measured: Vec<Vec<Measured>> = drawn.iter().map(|_| Vec::new()).collect();

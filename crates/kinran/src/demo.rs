@@ -214,7 +214,7 @@ fn take_picture(subject: Subject, scale: &Scale, folder: &Path, progress: &Progr
     let (surfaces, _) = scene_surfaces(&scene, Mips::Filtered(Filter::Ml), progress)?;
     let view = view(&scene, subject, scale.hero)?;
     let filtering = TextureFiltering::Mips { max_anisotropy: 16 };
-    let prepared = view.scene(&scene, surfaces)?;
+    let prepared = view.scene(&scene, surfaces, progress)?;
     let film = view.render(&prepared, subject.title(), scale.hero_samples, filtering, progress)?;
     let hero = Picture { width: film.width, height: film.height, pixels: view.display(&film) };
     hero.write(&folder.join(picture(subject)))

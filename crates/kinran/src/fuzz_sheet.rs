@@ -220,7 +220,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
     let mips = if only_baked { Mips::Baked } else { Mips::Filtered(Filter::Linear) };
     let (surfaces, apart) = scene_surfaces(&scene, mips, &progress)?;
-    let prepared = view.scene(&scene, surfaces)?;
+    let prepared = view.scene(&scene, surfaces, &progress)?;
     let left_out = painter.left_out(&view, &prepared);
     let told = scene.warnings.iter().chain(view.environment_notes()).cloned();
     let warnings: Vec<String> = told.chain(apart).chain(left_out).collect();
@@ -443,7 +443,7 @@ impl Studio<'_> {
                 (material.metallic_roughness, material.surface) = (None, None);
             }
         }
-        scene.fit_fuzz(fuzz_fits);
+        scene.fit_fuzz(|phase, spread| fuzz_fits(phase, spread, self.progress));
         scene.lights.clone_from(&shot.view.lights);
         scene.surroundings = shot.view.environment.clone().map(|e| Arc::new(Surroundings::new(e)));
         let filtering = TextureFiltering::Mips { max_anisotropy: 16 };

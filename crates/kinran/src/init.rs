@@ -133,7 +133,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         left_out: survey.left_out,
         text,
     };
-    console.result(&report, &summary)
+    // What a manifest would say was asked for: it comes when quiet too.
+    Console { quiet: console.quiet && !args.dry_run, ..console.clone() }.result(&report, &summary)
 }
 
 impl Survey {

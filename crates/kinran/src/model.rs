@@ -125,6 +125,23 @@ impl Place {
     }
 }
 
+/// The model that a path names: the file, or the only model in a folder.
+///
+/// # Errors
+/// Those of [`Place::of`], and [`Error::File`] for a folder of textures alone.
+pub(crate) fn model_at(path: &Path) -> Result<PathBuf, Error> {
+    if !path.is_dir() {
+        return Ok(path.into());
+    }
+    match Place::of(path)? {
+        Place::File(path) => Ok(path),
+        Place::Textures(path, _) => {
+            let reason = "holds baked textures and no model; name the model, or draw the textures with `kinran render`";
+            Err(Error::file_error(&path, reason))
+        }
+    }
+}
+
 impl Model {
     /// Reads what lies at `path`, see [`Place::of`]; textures alone are laid on boards a metre wide, one for each material.
     ///

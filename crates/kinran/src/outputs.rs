@@ -24,10 +24,19 @@ pub(crate) fn beside(input: &Path, name: &str) -> PathBuf {
     full.as_deref().unwrap_or(input).parent().unwrap_or(Path::new("")).join(name)
 }
 
-/// What is called after the input and stands beside it: `lamp.render.png` beside `lamp.glb` or a folder `lamp`.
+/// What is called after the input and stands beside it: `lamp.render.png` beside `lamp.glb` or a folder `lamp`, and
+/// `lamp.obj.render.png` where `lamp.glb` is there as well.
 pub(crate) fn named_after(input: &Path, ending: &str) -> PathBuf {
     let full = input.canonicalize().unwrap_or_else(|_| input.to_path_buf());
-    let name = if full.is_dir() { full.file_name() } else { full.file_stem() };
+    let is_model = |path: &Path| kinran_scene::is_gltf(path) || has_extension(path, "obj");
+    let stands_for = |path: PathBuf| {
+        let name =
+            if path.is_dir() { path.file_name() } else { path.file_stem().filter(|_| is_model(&path)) };
+        path != full && name.is_some() && name == full.file_stem()
+    };
+    let siblings = || full.parent().and_then(|folder| std::fs::read_dir(folder).ok()).into_iter().flatten();
+    let is_shared = || siblings().flatten().any(|entry| stands_for(entry.path()));
+    let name = if full.is_dir() || is_shared() { full.file_name() } else { full.file_stem() };
     beside(input, &format!("{}{ending}", name.unwrap_or_default().to_string_lossy()))
 }
 
@@ -157,11 +166,22 @@ impl WrittenFile {
 /// The end of a report's name, by which a later run finds it.
 const REPORTS: [&str; 2] = [".kinran.json", ".detail.json"];
 
+/// Files that a sentence on earlier runs names.
+const KEPT_NAMED: usize = 4;
+
 /// A report, as far as it says which files are its own.
 #[derive(Deserialize)]
 struct KnownFiles {
     written: Vec<WrittenFile>,
+    #[serde(default)]
+    kept: Vec<WrittenFile>,
     source: Option<String>,
+}
+
+impl KnownFiles {
+    fn files(self) -> impl Iterator<Item = WrittenFile> {
+        self.written.into_iter().chain(self.kept)
+    }
 }
 
 fn is_report(file: &str) -> bool {
@@ -247,7 +267,29 @@ pub(crate) fn way(folder: &Path, path: &Path) -> Option<String> {
 fn known_files(folder: &Path) -> BTreeSet<WrittenFile> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let reports = entries.map(|e| e.path()).filter(|path| is_report(&path.to_string_lossy()));
-    reports.filter_map(|path| read_report(&path)).flat_map(|report| report.written).collect()
+    reports.filter_map(|path| read_report(&path)).flat_map(KnownFiles::files).collect()
+}
+
+/// What earlier runs wrote beside `report`, this one did not, and nobody has changed since: textures of another
+/// container or form. Asked before the report is written anew.
+pub(crate) fn kept_files(folder: &Path, report: &str, written: &[WrittenFile]) -> Vec<WrittenFile> {
+    let Some(earlier) = read_report(&folder.join(report)) else { return Vec::new() };
+    let is_new = |kept: &WrittenFile| written.iter().all(|w| w.file != kept.file) && kept.file != report;
+    let is_there = |kept: &WrittenFile| WrittenFile::of(folder, &*kept.file).is_ok_and(|now| now == *kept);
+    earlier.files().filter(|kept| is_new(kept) && is_there(kept)).collect()
+}
+
+/// A line on files that [`kept_files`] found; empty where there are none.
+pub(crate) fn kept_remark(kept: &[WrittenFile]) -> String {
+    let names: Vec<&str> = kept.iter().map(|w| &*w.file).take(KEPT_NAMED).collect();
+    let more = match kept.len() - names.len() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    match names.len() {
+        0 => String::new(),
+        _ => format!("of an earlier run with other flags, no longer in use: {}{more}\n", names.join(", ")),
+    }
 }
 
 fn read_report(path: &Path) -> Option<KnownFiles> {
@@ -354,6 +396,21 @@ pub(crate) fn bytes_text(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_of_two_models_of_one_stem_take_one_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("lamp.glb"), "").unwrap();
+        std::fs::write(path("lamp.png"), "").unwrap();
+        let name = |input: &str| named_after(&path(input), ".render.png");
+        assert_eq!(name("lamp.glb"), path("lamp.render.png"));
+        std::fs::write(path("lamp.obj"), "").unwrap();
+        assert_eq!(name("lamp.glb"), path("lamp.glb.render.png"));
+        assert_eq!(name("lamp.obj"), path("lamp.obj.render.png"));
+        std::fs::create_dir(path("lamp")).unwrap();
+        assert_eq!(name("lamp"), path("lamp.render.png"));
+    }
 
     #[test]
     fn a_full_disk_is_found_out_after_the_work() {

@@ -226,8 +226,8 @@ impl Work {
 }
 
 impl Board {
-    /// Draws, and tells whether there was anything to draw.
-    fn draw(&self) -> bool {
+    /// Draws, a due line to `lines`, and tells whether there was anything to draw.
+    fn draw(&self, lines: &mut dyn Write) -> bool {
         let mut running = lock(&self.running);
         running.is_drawn = !running.works.is_empty();
         if !running.is_drawn || self.started.elapsed() < PATIENCE {
@@ -242,7 +242,7 @@ impl Board {
         if !shown.is_empty() && last_line.elapsed() >= LINE_STEP {
             *last_line = Instant::now();
             // Nobody is left to tell that standard error is closed.
-            let _ = writeln!(stderr(), "{}", line(&shown.iter().map(|work| work.line()).collect::<Vec<_>>()));
+            let _ = writeln!(lines, "{}", line(&shown.iter().map(|work| work.line()).collect::<Vec<_>>()));
         }
         true
     }
@@ -258,7 +258,7 @@ fn style(has_share: bool) -> ProgressStyle {
 
 /// Draws as long as anything is done.
 fn draw(board: &Weak<Board>) {
-    while board.upgrade().is_some_and(|board| board.draw()) {
+    while board.upgrade().is_some_and(|board| board.draw(&mut stderr())) {
         std::thread::sleep(FRAME);
     }
 }
@@ -336,6 +336,26 @@ mod tests {
                 std::thread::sleep(FRAME);
             }
         }
+    }
+
+    #[test]
+    fn a_pipe_stays_silent_or_is_flooded() {
+        let ago = |seconds| Instant::now() - Duration::from_secs(seconds);
+        let board = |started, last_line| Board {
+            started,
+            running: Mutex::new(Running { works: vec![Arc::new(work(10, 4))], is_drawn: true }),
+            bars: MultiProgress::new(),
+            last_line: Some(Mutex::new(last_line)),
+        };
+        let written = |board: &Board| {
+            let mut lines = Vec::new();
+            assert!(board.draw(&mut lines));
+            String::from_utf8(lines).unwrap()
+        };
+        let long = board(ago(8), ago(4));
+        assert_eq!(written(&long), "baking lamp: 40 %, 12 s left\n");
+        assert_eq!(written(&long), "", "a second line right after the first");
+        assert_eq!(written(&board(ago(0), ago(4))), "", "a line about what takes no time");
     }
 
     #[test]

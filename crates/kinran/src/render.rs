@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use kinran_bake::aniso::Filter;
 use kinran_image::{Channels, Image, Pixels, write_exr, write_png};
 use kinran_render::reference::TextureFiltering;
 use kinran_scene::Scene;
@@ -12,7 +14,7 @@ pub use crate::backend::Backend;
 use crate::model::Model;
 use crate::skin::missing_curvature;
 use crate::surfaces::{Mips, scene_surfaces};
-use crate::values::{counted, filter};
+use crate::values::counted;
 use crate::view::{View, ViewArgs, file_name};
 use crate::{Console, Error, outputs};
 
@@ -57,10 +59,10 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub spp: u32,
 
-    /// Which mips are baked before rendering: ml, dpd, linear, param, lean or naive; none samples level 0
-    /// alone, uncompressed, which with many samples in a pixel is ground truth; baked takes those of the model's own
-    /// KTX2 or DDS files. The default is baked where there are such files, else ml
-    #[arg(long, value_name = "NAME", value_parser = mips)]
+    /// The filter by which mips are baked before rendering; none samples level 0 alone, uncompressed, which with many
+    /// samples in a pixel is ground truth; baked takes the mips of the model's own KTX2 or DDS files. The default is baked where
+    /// there are such files, else ml
+    #[arg(long, value_name = "NAME", value_parser = mips())]
     pub filter: Option<Mips>,
 
     /// The most places along a slanted pixel's footprint at which a texture is read; 1 is trilinear
@@ -72,14 +74,15 @@ pub struct Args {
     pub view: ViewArgs,
 }
 
-fn mips(text: &str) -> Result<Mips, String> {
-    if text == "none" {
-        return Ok(Mips::Level0);
-    }
-    if text == "baked" {
-        return Ok(Mips::Baked);
-    }
-    filter(text).map(Mips::Filtered).map_err(|e| format!("{e}, none, baked"))
+fn mips() -> impl TypedValueParser<Value = Mips> {
+    let all = || Filter::ALL.map(Mips::Filtered).into_iter().chain([Mips::Level0, Mips::Baked]);
+    PossibleValuesParser::new(all().map(mips_name))
+        .map(move |name| all().find(|mips| mips_name(*mips) == name).expect("only names pass"))
+}
+
+/// What `--filter` calls mips.
+fn mips_name(mips: Mips) -> &'static str {
+    if mips == Mips::Level0 { "none" } else { mips.name() }
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -108,7 +111,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
     let own = Mips::of(&scene);
     let mips = args.filter.unwrap_or(own);
-    let refuse = |reason: &str| Err(Error::flag_error_of(&path, format!("--filter {}", mips.name()), reason));
+    let refuse =
+        |reason: &str| Err(Error::flag_error_of(&path, format!("--filter {}", mips_name(mips)), reason));
     if only_baked && !matches!(mips, Mips::Baked | Mips::Level0) {
         return refuse(
             "a folder of baked textures has no maps to bake; leave --filter out, or name the model",
@@ -127,9 +131,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         Mips::Level0 => TextureFiltering::Level0,
         Mips::Filtered(_) | Mips::Baked => TextureFiltering::Mips { max_anisotropy: args.max_anisotropy },
     };
-    let preparing = progress.busy("preparing the scene");
-    let prepared = view.scene(&scene, surfaces)?;
-    drop(preparing);
+    let prepared = view.scene(&scene, surfaces, &progress)?;
     painter.left_out(&view, &prepared).iter().for_each(|what| console.warn(what));
     let film = painter.film(&view, &prepared, "render", args.spp, filtering, &progress)?;
     if outputs::has_extension(&output, "exr") {
@@ -144,7 +146,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         width: film.width,
         height: film.height,
         samples_per_pixel: args.spp,
-        filter: mips.name(),
+        filter: mips_name(mips),
         triangles: triangles(&scene),
         warnings,
     };

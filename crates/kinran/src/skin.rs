@@ -13,8 +13,8 @@ use kinran_shading::skin::lighting::SKIN_NORMAL_BLUR;
 use kinran_shading::skin::profile::{Gaussian, SKIN};
 use kinran_shading::{ALPHA_MIN, alpha_from_roughness};
 
-use crate::Error;
 use crate::values::{number, vector};
+use crate::{Error, Progress};
 
 /// Texels of the punctual table, and of the ambient one across.
 pub(crate) const SIZE: (usize, usize) = (512, 128);
@@ -81,7 +81,12 @@ fn normals(text: &str) -> Result<Vec3, String> {
 ///
 /// # Errors
 /// Where a profile is none.
-pub fn attach_skin(scene: &Scene, prepared: &mut RenderScene, args: &SkinArgs) -> Result<(), Error> {
+pub fn attach_skin(
+    scene: &Scene,
+    prepared: &mut RenderScene,
+    args: &SkinArgs,
+    progress: &Progress,
+) -> Result<(), Error> {
     let curved = scene.primitives.iter().any(|p| p.curvature.is_some());
     let range = if curved { prepared.geometry.curvature_range() } else { CURVATURE_RANGE };
     let mut known: Vec<(&Skin, Arc<SkinTables>)> = Vec::new();
@@ -91,7 +96,7 @@ pub fn attach_skin(scene: &Scene, prepared: &mut RenderScene, args: &SkinArgs) -
         let tables = match known.iter().find(|(other, _)| same(other)) {
             Some((_, tables)) => tables.clone(),
             None => {
-                let tables = Arc::new(tables(skin, &material.name, range)?);
+                let tables = Arc::new(tables(skin, &material.name, range, progress)?);
                 known.push((skin, tables.clone()));
                 tables
             }
@@ -161,12 +166,19 @@ pub fn profile(skin: &Skin) -> Profile {
 ///
 /// # Errors
 /// Where its profile is none.
-pub(crate) fn tables(skin: &Skin, material: &str, range: f32) -> Result<SkinTables, Error> {
+pub(crate) fn tables(
+    skin: &Skin,
+    material: &str,
+    range: f32,
+    progress: &Progress,
+) -> Result<SkinTables, Error> {
     let profile = profile(skin);
     let radial = profile.radial().map_err(|e| Error::Usage(format!("material \"{material}\": {e}")))?;
     let table = skin_table;
+    let stage = progress.stage("integrating tables of skin", (SIZE.0 * SIZE.1) as u64);
+    let add = |points| stage.add(points);
     Ok(SkinTables {
-        punctual: table(punctual_table(radial, SIZE.0, SIZE.1, f64::from(range), &|_| {})),
+        punctual: table(punctual_table(radial, SIZE.0, SIZE.1, f64::from(range), &add)),
         ambient: table(ambient_table(radial, SIZE.0, f64::from(range))),
         penumbra: table(penumbra_table(radial, PENUMBRA_SIZE.0, PENUMBRA_SIZE.1, 1.0)),
         range,

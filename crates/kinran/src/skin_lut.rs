@@ -18,8 +18,8 @@ use serde::Serialize;
 use crate::bake::Container;
 use crate::content::Content;
 use crate::outputs::{
-    Space, WrittenFile, beside, check_folder, check_space, refuse_foreign, refuse_input, replaced_bytes,
-    tell_place,
+    Space, WrittenFile, beside, check_folder, check_space, kept_files, kept_remark, refuse_foreign,
+    refuse_input, replaced_bytes, tell_place,
 };
 use crate::values::{number, size};
 use crate::{Console, Error};
@@ -149,6 +149,9 @@ pub(crate) struct Report {
     tables: Vec<TableReport>,
     /// Every file that was written beside this report.
     written: Vec<WrittenFile>,
+    /// What earlier runs wrote beside it, under other flags, and is there as they left it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    kept: Vec<WrittenFile>,
 }
 
 /// A table.
@@ -227,6 +230,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         range: args.range,
         tables: Vec::new(),
         written: Vec::new(),
+        kept: Vec::new(),
     };
     let mut add = |content, table: &Table, across, down, interpolation_error| -> Result<(), Error> {
         report.tables.push(write_table(args, content, table, across, down, interpolation_error)?);
@@ -244,6 +248,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         .write(&args.output().join(format!("{}.png", args.name)))?;
     report.written =
         files.iter().map(|file| WrittenFile::of(&args.output(), file)).collect::<Result<_, _>>()?;
+    report.kept = kept_files(&args.output(), &sidecar, &report.written);
     let mut text = serde_json::to_string_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
     text.push('\n');
     write_atomically(&args.output().join(sidecar), text.as_bytes())?;
@@ -264,6 +269,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         );
     }
     lines += &format!("{}\n", args.output().join(format!("{}.png", args.name)).display());
+    lines += &kept_remark(&report.kept);
     console.result(&report, &lines)?;
     tell_place(console, args.output.as_deref(), &args.output());
     Ok(())

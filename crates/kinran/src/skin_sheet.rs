@@ -9,7 +9,7 @@ use kinran_bake::aniso::Filter;
 use kinran_bake::curvature::{BLUR, Mesh, Options, bake_curvature, estimated_normals, principal};
 use kinran_bake::skin_lut::{Profile, Table, punctual_table};
 use kinran_render::reference::{
-    PictureCamera, RenderScene, RenderSkin, SkinCurvature, SurfacePoint, TextureFiltering,
+    PictureCamera, RenderScene, RenderSkin, SkinCurvature, SkinTable, SurfacePoint, TextureFiltering,
 };
 use kinran_scene::{Light, LightKind, Needs, Primitive, Scene, Skin, VertexCurvature, any_tangent};
 use kinran_shading::Sym2;
@@ -22,7 +22,7 @@ use serde::Serialize;
 use crate::bake::curvature::{
     Blur, Joined, MethodName, deviations, measured, meshes, pose_scale, shares, triangles_of, unit,
 };
-use crate::model::read_scene;
+use crate::model::{model_at, read_scene};
 use crate::picture::{Color, INK, PAPER, Picture, Row, grid};
 use crate::skin::{SIZE, profile, skin_table};
 use crate::skin_lut::plot::plot;
@@ -160,22 +160,21 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         return Err(Error::flag_error(given, "each must lie in 0 to 1"));
     }
     let progress = console.progress();
-    let mut scene = read_scene(&args.file, &args.view.model, &Needs::ALL, &progress)?;
+    let file = model_at(&args.file)?;
+    let mut scene = read_scene(&file, &args.view.model, &Needs::ALL, &progress)?;
     let mut warnings = scene.warnings.clone();
     if scene.materials.iter().all(|m| m.skin.is_none()) {
         scene.materials.iter_mut().for_each(|m| m.skin = Some(Skin::default()));
     }
     bake(args, &mut scene, &progress, &mut warnings)?;
 
-    let mut view = View::new(&scene, &args.file.to_string_lossy(), &args.view)?;
+    let mut view = View::new(&scene, &file.to_string_lossy(), &args.view)?;
     let (surfaces, apart) = scene_surfaces(&scene, Mips::Filtered(Filter::Linear), &progress)?;
     warnings.extend(view.environment_notes().cloned().chain(apart));
     warnings.iter().for_each(|w| console.warn(w));
-    let preparing = progress.busy("preparing the scene");
-    let mut prepared = view.scene(&scene, surfaces)?;
-    drop(preparing);
+    let mut prepared = view.scene(&scene, surfaces, &progress)?;
     // An .obj has no colours, and white is what a glTF that says nothing gives.
-    let colorless = outputs::has_extension(&args.file, "obj");
+    let colorless = outputs::has_extension(&file, "obj");
     for material in &mut prepared.materials {
         let white = material.base_color.is_none() && material.base_color_factor.truncate() == Vec3::ONE;
         let unsaid = colorless || white;
@@ -189,6 +188,10 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     }
     if !args.whole && args.crop.is_none() && args.view.camera.is_none() && args.view.distance == 1.0 {
         approach(&mut view, &prepared);
+    }
+    if let Some(remark) = too_flat(&prepared) {
+        console.warn(&remark);
+        warnings.push(remark);
     }
     let pictures = sheets.iter().map(|&sheet| count(sheet)).sum::<u64>();
     let all = progress.stage("sheets", pictures * samples_of(args.view.size, args.spp));
@@ -279,6 +282,30 @@ fn count(sheet: Sheet) -> u64 {
         Sheet::Tensors => 0,
     }
 }
+
+/// A sentence where no curvature of the model changes what its skin looks like by as much as one sees.
+fn too_flat(prepared: &RenderScene) -> Option<String> {
+    let range = prepared.geometry.curvature_range();
+    let changes = |table: &SkinTable| {
+        let (first, last) = (&table.texels[..table.width], &table.texels[table.texels.len() - table.width..]);
+        let apart = first.iter().zip(last).map(|(flat, curved)| (*flat - *curved).abs().max_element());
+        apart.fold(0.0, f32::max)
+    };
+    let tables = || prepared.materials.iter().filter_map(|m| m.skin.as_ref());
+    let skin = tables().next()?;
+    let most = tables().map(|skin| changes(&skin.tables.punctual)).fold(0.0, f32::max);
+    (most < FLAT).then(|| {
+        format!(
+            "nothing here is curved more than a ball of {:.0} mm, on which light hardly scatters round the edge: the rows will \
+             look alike. A unit of the file is taken as {:.0} mm; --unit-mm says otherwise",
+            range.recip(),
+            skin.millimetres
+        )
+    })
+}
+
+/// Irradiance at grazing light, of 1, from which skin looks unlike plain diffuse; chosen by eye.
+const FLAT: f32 = 0.02;
 
 /// The name of a sheet's picture.
 fn sheet_file(sheet: Sheet) -> String {
@@ -395,11 +422,15 @@ impl Studio<'_> {
         }
         let (apart, gain) = enlarged_differences(&pictures[1], &pictures[2]);
         pictures.push(apart);
+        let change = match gain {
+            None => "what direction changes: nothing that shows, since nothing here is a ridge".to_owned(),
+            Some(gain) => format!("what direction changes, {gain} times enlarged"),
+        };
         let names = [
             "zero: light does not scatter".to_owned(),
             "mean curvature: light scatters alike in all directions".into(),
             "directional curvature: most across ridges, hardly along them".into(),
-            format!("what direction changes, {gain} times enlarged"),
+            change,
         ];
         let rows = names.into_iter().zip(pictures).enumerate().map(|(i, (name, pictures))| Row {
             name,
@@ -425,7 +456,7 @@ impl Studio<'_> {
         ];
         let pictures = self.row(row);
         let skin = self.skin()?;
-        let table = |t: &kinran_render::reference::SkinTable| Table {
+        let table = |t: &SkinTable| Table {
             width: t.width,
             height: t.height,
             entries: t.texels.iter().map(|t| t.to_array()).collect(),
@@ -490,12 +521,16 @@ impl Studio<'_> {
             rights.push(self.draw("linear", &self.prepared, &light)?);
         }
         let (apart, gain) = enlarged_differences(&wrongs, &rights);
+        let difference = match gain {
+            None => "difference: nothing that shows".to_owned(),
+            Some(gain) => format!("difference, {gain} times enlarged"),
+        };
         let rows = wrongs.into_iter().zip(rights).zip(apart).map(|((wrong, right), apart)| Row {
             name: String::new(),
             cells: vec![
                 ("radial profile on the ring (wrong)".to_owned(), wrong),
                 ("linear profile (right)".to_owned(), right),
-                (format!("difference, {gain} times enlarged"), apart),
+                (difference.clone(), apart),
             ],
         });
         Ok(self.rows(rows.collect()))
@@ -506,7 +541,7 @@ impl Studio<'_> {
         let skin = self.skin()?;
         let width = if skin.penumbra > 0.0 { skin.penumbra } else { 8.0 };
         let ramp: Vec<Vec3> = (0..64).map(|i| Vec3::splat((i as f32 + 0.5) / 64.0)).collect();
-        let ramp = kinran_render::reference::SkinTable { width: 64, height: 1, texels: ramp };
+        let ramp = SkinTable { width: 64, height: 1, texels: ramp };
         let plain = |skin: &mut RenderSkin| {
             skin.penumbra = width;
             skin.tables = Arc::new(kinran_render::reference::SkinTables {
@@ -668,10 +703,14 @@ impl Studio<'_> {
                 let frame = point.tangent_frame;
                 let direction =
                     along * frame.x_axis.normalize_or_zero() + across * frame.y_axis.normalize_or_zero();
-                let share = ((larger - smaller.max(0.0)) / larger).clamp(0.0, 1.0);
+                let apart = larger - smaller.max(0.0);
+                // A code's root of curvature has steps of 1/255: within two of them directions are chance.
+                let is_round = apart < 4.0 / 255.0 * (larger * range).sqrt();
+                let share = if is_round { 0.0 } else { (apart / larger).clamp(0.0, 1.0) };
                 // As long as the spacing where it lies across the view, foreshortened elsewhere.
                 let distance = point.position.distance(self.view.camera.transform.translation.into());
-                let half = 0.55 * SPACING as f32 * distance / focal * (0.2 + 0.8 * share);
+                let length = if is_round { 0.0 } else { 0.2 + 0.8 * share };
+                let half = 0.55 * SPACING as f32 * distance / focal * length;
                 let off = 0.02 * distance / focal * SPACING as f32 * view;
                 let [a, b] = [-half, half].map(|t| project(point.position + off + t * direction));
                 picture.line(a, b, false_color(0.25 + 0.75 * (larger / range).min(1.0).sqrt()));
@@ -682,8 +721,8 @@ impl Studio<'_> {
 }
 
 /// Differences of pictures in false colour, the largest of each pixel's channels, all enlarged so many times: by the power of
-/// two at which the largest ones but a few are not yet white.
-fn enlarged_differences(a: &[Picture], b: &[Picture]) -> (Vec<Picture>, u32) {
+/// two at which the largest ones but a few are not yet white. `None` and black where they are but noise and rounding.
+fn enlarged_differences(a: &[Picture], b: &[Picture]) -> (Vec<Picture>, Option<u32>) {
     let largest = |a: &Color, b: &Color| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
     let apart = |a: &Picture, b: &Picture| -> Vec<u8> {
         a.pixels.iter().zip(&b.pixels).map(|(a, b)| largest(a, b)).collect()
@@ -694,7 +733,8 @@ fn enlarged_differences(a: &[Picture], b: &[Picture]) -> (Vec<Picture>, u32) {
     seen.sort_unstable();
     let most = u32::from(seen.get(seen.len() * 99 / 100).copied().unwrap_or(255));
     let gain = [1, 2, 4, 8, 16, 32].into_iter().rev().find(|gain| gain * most <= 255).unwrap_or(1);
-    let color = |c: u8| false_color((u32::from(c) * gain) as f32 / 255.0);
+    let gain = (!seen.is_empty() && most >= SEEN).then_some(gain);
+    let color = |c: u8| false_color((u32::from(c) * gain.unwrap_or(0)) as f32 / 255.0);
     let pictures = a.iter().zip(apart).map(|(a, apart)| Picture {
         width: a.width,
         height: a.height,
@@ -702,6 +742,9 @@ fn enlarged_differences(a: &[Picture], b: &[Picture]) -> (Vec<Picture>, u32) {
     });
     (pictures.collect(), gain)
 }
+
+/// Steps of 8 bits from which a difference shows beside another picture; chosen by eye.
+const SEEN: u32 = 2;
 
 /// Behind curvature; chosen by eye.
 const BACKDROP: Color = [58, 60, 66];

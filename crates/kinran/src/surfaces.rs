@@ -34,7 +34,7 @@ pub enum Mips {
 }
 
 impl Mips {
-    /// The filter's name, or `truth`.
+    /// The filter's name, `baked`, or `truth`.
     pub fn name(self) -> &'static str {
         match self {
             Mips::Filtered(filter) => filter.name(),
@@ -261,7 +261,7 @@ fn separate_surface(
 
 /// Coefficients of layers of fibres, for [`RenderScene::fit_fuzz`](kinran_render::reference::RenderScene::fit_fuzz): some
 /// 200 ms of one core, and 1.6 s more for combed fibres. The last ones are kept.
-pub fn fuzz_fits(phase: FuzzPhase, spread: f32) -> Arc<FuzzFits> {
+pub fn fuzz_fits(phase: FuzzPhase, spread: f32, progress: &Progress) -> Arc<FuzzFits> {
     static LAST: Mutex<Option<(FuzzPhase, f32, Arc<FuzzFits>)>> = Mutex::new(None);
     let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((of, at, fits)) = &*last
@@ -274,10 +274,22 @@ pub fn fuzz_fits(phase: FuzzPhase, spread: f32) -> Arc<FuzzFits> {
         FuzzPhase::Velvet => Phase::Velvet,
     };
     let tilts: Vec<f64> = (0..FUZZ_TILTS).map(|i| FRAC_PI_2 * i as f64 / (FUZZ_TILTS - 1) as f64).collect();
-    let fits: Vec<FuzzFit> = tilts.par_iter().map(|&tilt| fuzz_fit(named, tilt, spread.into())).collect();
     let combed = fuzz_alpha(spread) < FUZZ_COMBED_ALPHA;
+    let stage = progress.stage("fitting fuzz", if combed { 2 } else { 1 } * FUZZ_TILTS as u64);
+    let fits: Vec<FuzzFit> = (tilts.par_iter())
+        .map(|&tilt| {
+            let fit = fuzz_fit(named, tilt, spread.into());
+            stage.add(1);
+            fit
+        })
+        .collect();
     let table = combed.then(|| {
-        tilts.par_iter().flat_map_iter(|&tilt| ambient_texels(named, tilt, spread.into())).collect()
+        let texels = |&tilt: &f64| {
+            let texels = ambient_texels(named, tilt, spread.into());
+            stage.add(1);
+            texels
+        };
+        tilts.par_iter().flat_map_iter(texels).collect()
     });
     let tilts = std::array::from_fn(|i| FuzzCoefficients {
         p_s: fits[i].p_s.coefficients,

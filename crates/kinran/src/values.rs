@@ -1,5 +1,6 @@
 //! What people type as flags.
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::Vec3;
 use kinran_bake::aniso::Filter;
 use kinran_image::MAX_SIDE;
@@ -54,12 +55,11 @@ pub(crate) fn list(names: &[String]) -> String {
     if names.is_empty() { "none".into() } else { names.join(", ") }
 }
 
-/// A filter's name.
-pub(crate) fn filter(text: &str) -> Result<Filter, String> {
-    Filter::ALL.into_iter().find(|f| f.name() == text).ok_or_else(|| {
-        let names = Filter::ALL.map(Filter::name).join(", ");
-        format!("choose one of {names}")
-    })
+/// Takes a filter by its name, and tells help and completions which there are.
+pub(crate) fn filter() -> impl TypedValueParser<Value = Filter> {
+    let named = |name: String| Filter::ALL.into_iter().find(|f| f.name() == name);
+    PossibleValuesParser::new(Filter::ALL.map(Filter::name))
+        .map(move |name| named(name).expect("only names of filters pass"))
 }
 
 #[cfg(test)]

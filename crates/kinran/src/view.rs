@@ -317,11 +317,18 @@ impl View {
     ///
     /// # Errors
     /// Those of [`RenderScene::new`].
-    pub fn scene(&self, scene: &Scene, surfaces: Vec<Option<SurfaceTextures>>) -> Result<RenderScene, Error> {
+    pub fn scene(
+        &self,
+        scene: &Scene,
+        surfaces: Vec<Option<SurfaceTextures>>,
+        progress: &Progress,
+    ) -> Result<RenderScene, Error> {
+        let preparing = progress.busy("preparing the scene");
         let mut prepared = RenderScene::new(scene, surfaces, self.environment.clone())?;
-        prepared.fit_fuzz(fuzz_fits);
+        drop(preparing);
+        prepared.fit_fuzz(|phase, spread| fuzz_fits(phase, spread, progress));
         prepared.lights.clone_from(&self.lights);
-        attach_skin(scene, &mut prepared, &self.skin)?;
+        attach_skin(scene, &mut prepared, &self.skin, progress)?;
         prepared.materials.iter_mut().filter_map(|m| m.detail.as_mut()).for_each(|d| d.shown = self.detail);
         Ok(prepared)
     }

@@ -297,8 +297,6 @@ fn a_dry_run_writes() {
         let said = kinran(&["bake", text(source), "-o", text(&out), "--dry-run"]);
         assert_eq!(said.code, Some(0), "{}", said.err);
         assert!(!said.out.is_empty());
-        let names_alone = said.out.contains("texels were not looked at");
-        assert_eq!(names_alone, source == input.path(), "{}", said.out);
         assert!(files(parent.path()).is_empty(), "written: {:?}", files(parent.path()));
     }
 }

@@ -225,6 +225,7 @@ fn a_bake_keeps_fuzz_and_leaves_a_sheen_for_others() {
 #[test]
 fn between_the_tilts_of_a_fit_its_error_stays_within_what_is_stated() {
     use glam::DVec3;
+    use kinran::Progress;
     use kinran::surfaces::fuzz_fits;
     use kinran_bake::fuzz_fit::{Fibres, Phase};
     use kinran_scene::FuzzPhase;
@@ -232,7 +233,7 @@ fn between_the_tilts_of_a_fit_its_error_stays_within_what_is_stated() {
 
     let mut stated = Vec::new();
     for (spread, low, high) in [(0.01, 0.93, 1.3), (0.04, 0.95, 1.1), (0.09, 0.8, 1.2), (0.2, 0.9, 1.1)] {
-        let fits = fuzz_fits(FuzzPhase::Fibre, spread);
+        let fits = fuzz_fits(FuzzPhase::Fibre, spread, &Progress::default());
         let mut range = (f64::INFINITY, 0.0f64);
         let mut dark = 0.0f64;
         // Halfway between neighbours, and a third from one.
@@ -270,6 +271,7 @@ fn between_the_tilts_of_a_fit_its_error_stays_within_what_is_stated() {
 mod realtime {
     use crate::sample_assets::sample_assets;
     use glam::{Affine3A, Vec3, vec2, vec3};
+    use kinran::Progress;
     use kinran::surfaces::fuzz_fits;
     use kinran_render::metrics::flip;
     use kinran_render::realtime::{Gpu, Realtime, Settings as GpuSettings, ShaderSource};
@@ -334,7 +336,7 @@ mod realtime {
             range: f32::INFINITY,
         }));
         let mut prepared = RenderScene::new(&scene, vec![None], environment).unwrap();
-        prepared.fit_fuzz(fuzz_fits);
+        prepared.fit_fuzz(|phase, spread| fuzz_fits(phase, spread, &Progress::default()));
         prepared
     }
 

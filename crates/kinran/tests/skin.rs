@@ -871,6 +871,16 @@ fn every_sheet_is_drawn_and_shows_something() {
         assert!(bright > pixels.len() / 200, "{name} is dark");
     }
 
+    // A ball of 40 m: rows that look alike are explained.
+    let ball = folder.path().join("ball.glb");
+    Mesh::sphere(40.0).write(&ball);
+    let shared_ball =
+        ["skin", str(&ball), "-o", str(&out), "--size", "64x48", "--spp", "1", "--sheet", "turn"];
+    let (code, _, said) = kinran(&shared_ball);
+    assert!(code == Some(0) && said.contains("--unit-mm"), "{said}");
+    let (_, _, said) = kinran(&[&shared[..], &["--sheet", "turn"]].concat());
+    assert!(!said.contains("hardly scatters"), "{said}");
+
     // The camera comes nearer, so that more of a sheet is skin than background; --whole leaves it where it was.
     let skin = |flags: &[&str]| {
         done(&[&shared[..], &["--sheet", "curvature"], flags].concat());

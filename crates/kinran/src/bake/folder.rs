@@ -12,9 +12,7 @@ use super::{
     sheet_format, texture_files, texture_space, write_texture,
 };
 use crate::content::Content;
-use crate::outputs::{
-    Space, check_space, has_extension, refuse_foreign, refuse_other_source, replaced_bytes,
-};
+use crate::outputs::{Space, check_space, refuse_foreign, refuse_other_source, replaced_bytes};
 use crate::{Console, Error};
 
 /// Bakes a folder and tells what came of it.
@@ -40,35 +38,24 @@ fn add_remarks(rows: &mut [Row], material: &str, file: &str, remarks: &[String])
     }
 }
 
-/// Extensions of files that leave something to choose when they are read, or say something of their own.
-const TALKATIVE: [&str; 6] = ["exr", "hdr", "tif", "tiff", "ktx2", "dds"];
-
-/// What a look at names leaves open.
-const UNSEEN: &str = "texels were not looked at, except of two files for one map: the bake itself checks whether normal \
-                      maps are normals, which way their green points, and whether directions and levels have their channels";
-
-/// Tells what was understood of a folder.
+/// Tells what a bake would make of a folder: its maps are read and judged, nothing is filtered or written.
 pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
     let mut folder = scan(&args.input, &args.hints())?;
-    for material in &folder.materials {
-        for (role, path) in &material.files {
-            let said = *role == MapRole::Color && args.color_space.is_some();
-            if said || TALKATIVE.iter().any(|extension| has_extension(path, extension)) {
-                let read = material.read(*role, path)?;
-                add_remarks(&mut folder.rows, &material.name, &file_name(path), &read.remarks);
-            }
-        }
-    }
     let mut report = Report::new(args);
-    let names = folder.materials.iter().map(|material| material.name.clone());
-    report.surfaces = names.map(SurfaceReport::new).collect();
+    let stage = console.progress().stage("reading", folder.materials.len() as u64);
     for material in &folder.materials {
-        report.warnings.extend(material.warnings.clone());
-        report.warnings.extend(material.compare_twins()?);
+        let loaded = material.load()?;
+        for map in &loaded.images {
+            add_remarks(&mut folder.rows, &loaded.name, &file_name(&map.path), &map.remarks);
+        }
+        report.surfaces.push(SurfaceReport::new(loaded.name));
+        report.warnings.extend(loaded.notes);
+        stage.add(1);
     }
+    drop(stage);
+    check_output(args, console, &folder.materials)?;
     report.warnings.iter().for_each(|warning| console.warn(warning));
-    let text = format!("{}\n{UNSEEN}\n", folder.table());
-    console.result(&BakeReport::new(args, folder.rows, vec![report]), &text)
+    console.result(&BakeReport::new(args, folder.rows.clone(), vec![report]), &folder.table())
 }
 
 /// Bakes every material found in a folder.
@@ -127,6 +114,20 @@ fn planned(args: &Args, materials: &[MaterialMaps]) -> (Vec<String>, Space) {
 
 /// Refuses what cannot be baked or written, before the first texture is.
 fn check(args: &Args, console: &Console, materials: &[MaterialMaps]) -> Result<(), Error> {
+    check_output(args, console, materials)?;
+    // A map that is none would be found out after hours of baking the materials before it.
+    if let [_, _, ..] = materials {
+        let stage = console.progress().stage("reading", materials.len() as u64);
+        for maps in materials {
+            maps.load()?;
+            stage.add(1);
+        }
+    }
+    Ok(())
+}
+
+/// Refuses what cannot be written.
+fn check_output(args: &Args, console: &Console, materials: &[MaterialMaps]) -> Result<(), Error> {
     let (files, space) = planned(args, materials);
     let mut names: Vec<String> = files.iter().map(|file| file.to_lowercase()).collect();
     names.sort_unstable();
@@ -139,14 +140,6 @@ fn check(args: &Args, console: &Console, materials: &[MaterialMaps]) -> Result<(
     let needed = space.beyond(replaced_bytes(args.output(), &files));
     if let Some(warning) = check_space(args.output(), needed)? {
         console.warn(warning);
-    }
-    // A map that is none would be found out after hours of baking the materials before it.
-    if let [_, _, ..] = materials {
-        let stage = console.progress().stage("reading", materials.len() as u64);
-        for maps in materials {
-            maps.load()?;
-            stage.add(1);
-        }
     }
     Ok(())
 }

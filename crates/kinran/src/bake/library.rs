@@ -140,11 +140,14 @@ impl LibraryReport {
         self.entries.iter().filter(|entry| entry.status == status).count()
     }
 
-    /// The counts; before them, with `verbose` and where nothing was done yet, a row for each entry that was not up to
-    /// date. Entries that failed are told after it.
-    fn text(&self, verbose: bool) -> String {
+    /// The counts; before them a row for each entry that would be done, with `names_done` each that was, with `verbose` all.
+    /// Entries that failed are told after it.
+    fn text(&self, verbose: bool, names_done: bool) -> String {
         let planned = |entry: &EntryReport| matches!(entry.status, Status::WouldBake | Status::WouldRestore);
-        let shown = |entry: &&EntryReport| planned(entry) || (verbose && entry.status != Status::Failed);
+        let done = |entry: &EntryReport| matches!(entry.status, Status::Baked | Status::Restored);
+        let shown = |entry: &&EntryReport| {
+            planned(entry) || (names_done && done(entry)) || (verbose && entry.status != Status::Failed)
+        };
         let rows = self.entries.iter().filter(shown).map(|entry| {
             let bytes: u64 = entry.files.iter().map(|file| file.bytes).sum();
             let size = match entry.files.len() {
@@ -245,7 +248,8 @@ impl Built {
         self.report.count(Status::UpToDate) < self.report.entries.len()
     }
 
-    /// Tells what was done, what is doubtful, where `again` also of entries that were up to date, and last what failed.
+    /// Tells what was done, what is doubtful, where `again` also of entries that were up to date, and last what failed. What
+    /// a later look baked is named: it is what somebody saved a moment ago.
     fn tell(&self, console: &Console, again: bool) -> Result<(), Error> {
         let told = |entry: &&EntryReport| again || entry.status != Status::UpToDate;
         for entry in self.report.entries.iter().filter(told) {
@@ -254,7 +258,7 @@ impl Built {
             }
         }
         self.report.warnings.iter().for_each(|warning| console.warn(warning));
-        console.result(&self.report, &self.report.text(console.verbose))?;
+        console.result(&self.report, &self.report.text(console.verbose, !again))?;
         self.failed.iter().for_each(|failure| console.error(failure));
         Ok(())
     }

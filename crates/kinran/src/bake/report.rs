@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::content::Content;
-use crate::outputs::{WrittenFile, way};
+use crate::outputs::{WrittenFile, kept_files, kept_remark, way};
 use crate::values::counted;
 
 /// A file that went in.
@@ -54,20 +54,24 @@ pub struct Output {
     pub blake3: String,
 }
 
+/// What reports and flags call a texel format.
+pub(crate) fn format_name(format: Format) -> &'static str {
+    match format {
+        Format::Bc1 => "bc1",
+        Format::Bc4 => "bc4",
+        Format::Bc5 => "bc5",
+        Format::Bc7 => "bc7",
+        Format::Rgba8 => "rgba8",
+        Format::Rgba16F => "rgba16f",
+    }
+}
+
 impl Output {
     pub(super) fn new(file: String, map: Content, texture: &Texture, bytes: &[u8]) -> Self {
-        let format = match texture.format {
-            Format::Bc1 => "bc1",
-            Format::Bc4 => "bc4",
-            Format::Bc5 => "bc5",
-            Format::Bc7 => "bc7",
-            Format::Rgba8 => "rgba8",
-            Format::Rgba16F => "rgba16f",
-        };
         Output {
             file,
             map,
-            format: format.into(),
+            format: format_name(texture.format).into(),
             transfer: if texture.transfer == Transfer::Srgb { "srgb" } else { "linear" },
             width: texture.levels[0].width,
             height: texture.levels[0].height,
@@ -119,6 +123,9 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// Every file that was written beside this report: a later run writes these again, and no others, without a question.
     pub written: Vec<WrittenFile>,
+    /// What earlier runs wrote beside this report, under other flags, and is there as they left it; nothing refers to it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub kept: Vec<WrittenFile>,
 }
 
 impl Report {
@@ -132,6 +139,7 @@ impl Report {
             curvature: Vec::new(),
             warnings: Vec::new(),
             written: Vec::new(),
+            kept: Vec::new(),
         }
     }
 
@@ -147,6 +155,7 @@ impl Report {
         let textures =
             textures.map(|o| WrittenFile { file: o.file.clone(), bytes: o.bytes, blake3: o.blake3.clone() });
         self.written = textures.chain(others).collect();
+        self.kept = kept_files(args.output(), file, &self.written);
         let mut text = serde_json::to_string_pretty(self).map_err(|e| Error::Internal(e.to_string()))?;
         text.push('\n');
         Ok(write_atomically(&args.output().join(file), text.as_bytes())?)
@@ -171,7 +180,8 @@ impl Report {
         text.extend(self.curvature.iter().map(super::CurvatureReport::text));
         let bytes: u64 = self.written.iter().map(|file| file.bytes as u64).sum();
         let files = counted(self.written.len(), "file", "files");
-        text + &format!("{files}, {:.1} KiB, in {}\n", bytes as f64 / 1024.0, folder.display())
+        text += &format!("{files}, {:.1} KiB, in {}\n", bytes as f64 / 1024.0, folder.display());
+        text + &kept_remark(&self.kept)
     }
 }
 
@@ -194,6 +204,8 @@ pub(crate) struct BakeReport {
     pub(super) surfaces: Vec<SurfaceReport>,
     /// Curvature of meshes.
     pub(super) curvature: Vec<super::CurvatureReport>,
+    /// Files of earlier runs, under other flags, that stay beside these; nothing refers to them.
+    pub(super) kept: Vec<WrittenFile>,
     /// What was left out or assumed, a sentence each.
     pub(super) warnings: Vec<String>,
 }
@@ -202,13 +214,25 @@ impl BakeReport {
     pub(super) fn new(args: &super::Args, files: Vec<Row>, reports: Vec<Report>) -> Self {
         let Report { kinran, filter, kernel, .. } = Report::new(args);
         let output = args.output().to_path_buf();
-        let (surfaces, curvature, warnings) = (Vec::new(), Vec::new(), Vec::new());
+        let (surfaces, curvature) = (Vec::new(), Vec::new());
+        let (kept, warnings) = (Vec::new(), Vec::new());
         let dry_run = args.dry_run;
-        let mut all =
-            BakeReport { kinran, output, dry_run, filter, kernel, files, surfaces, curvature, warnings };
+        let mut all = BakeReport {
+            kinran,
+            output,
+            dry_run,
+            filter,
+            kernel,
+            files,
+            surfaces,
+            curvature,
+            kept,
+            warnings,
+        };
         for report in reports {
             all.surfaces.extend(report.surfaces);
             all.curvature.extend(report.curvature);
+            all.kept.extend(report.kept);
             all.warnings.extend(report.warnings);
         }
         all

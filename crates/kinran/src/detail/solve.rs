@@ -22,12 +22,12 @@ use crate::bake::{Container, PresetName};
 use crate::content::Content;
 use crate::model::ModelArgs;
 use crate::outputs::{
-    Space, WrittenFile, beside, changed_files, check_folder, check_space, has_extension, refuse_foreign,
-    refuse_input, replaced_bytes, tell_place,
+    Space, WrittenFile, beside, changed_files, check_folder, check_space, has_extension, kept_files,
+    kept_remark, refuse_foreign, refuse_input, replaced_bytes, tell_place,
 };
 use crate::table::table;
 use crate::values::number;
-use crate::{Console, Error};
+use crate::{Console, Error, Stage};
 
 /// Solves one target: writes NAME_synthesized, its tiles as they were compressed, and NAME.detail.json
 ///
@@ -194,6 +194,9 @@ pub struct SolveReport {
     pub files: Vec<String>,
     /// The same with their hashes: a later run writes these again, and no others, without a question.
     pub written: Vec<WrittenFile>,
+    /// What earlier runs wrote beside this report, under other flags, and is there as they left it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub kept: Vec<WrittenFile>,
     /// Width and height of the target and of `s`.
     pub target_size: [u32; 2],
     /// Width and height of `s`.
@@ -401,9 +404,12 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         (solve(&target, &layers, &options, &|n| stage.add(n))?, None)
     };
 
-    let _busy = console.progress().busy("writing");
     let stem = file_stem(&args.target);
-    let mut files = write_textures(args, &stem, &solved, &tiles)?;
+    let written = 1 + tiles.keys().filter(|key| writes_tile(args, key)).count();
+    let textures = (written * args.container.extensions().len()) as u64;
+    let pictures = if args.pictures { PICTURES.len() as u64 } else { 0 };
+    let writing = console.progress().stage("writing", textures + pictures);
+    let mut files = write_textures(args, &stem, &solved, &tiles, &writing)?;
     if args.board || args.model.is_some() {
         let texture = |file: &Path, y_down: bool, is_mask: bool| {
             texture_files(args, &tile_name(&(file.to_path_buf(), y_down, is_mask), || tiles.keys()))
@@ -431,16 +437,21 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
             let file = format!("{stem}_{name}.png");
             write_atomically(&args.output().join(&file), &encode_png(image)?)?;
             files.push(file);
+            writing.add(1);
         }
     }
     let first = &solved.texture.levels[0];
-    let written = files.iter().map(|file| WrittenFile::of(&args.output(), file)).collect::<Result<_, _>>()?;
+    let written =
+        files.iter().map(|file| WrittenFile::of(&args.output(), file)).collect::<Result<Vec<_>, _>>()?;
+    let report_file = format!("{stem}.detail.json");
+    let kept = kept_files(&args.output(), &report_file, &written);
     let report = SolveReport {
         target: file_name(&args.target),
         kind: kind_name,
         kind_source,
         files,
         written,
+        kept,
         target_size: [size.0, size.1],
         size: [first.width, first.height],
         opacity,
@@ -450,7 +461,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         warnings,
     };
     let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
-    write_atomically(&args.output().join(format!("{stem}.detail.json")), &json)?;
+    write_atomically(&args.output().join(report_file), &json)?;
     Ok(report)
 }
 
@@ -545,6 +556,7 @@ fn write_textures(
     stem: &str,
     solved: &Solved,
     tiles: &Tiles,
+    writing: &Stage,
 ) -> Result<Vec<String>, Error> {
     std::fs::create_dir_all(args.output()).map_err(|e| kinran_image::Error::io(args.output(), e))?;
     let mut files = Vec::new();
@@ -559,6 +571,7 @@ fn write_textures(
             };
             write_atomically(&args.output().join(&file), &bytes)?;
             files.push(file);
+            writing.add(1);
         }
         Ok(())
     };
@@ -638,5 +651,6 @@ fn text(report: &SolveReport, folder: &Path) -> String {
         text += &format!("opacity of the layers: x {opacity}\n");
     }
     let json = format!("{}.detail.json", file_stem(Path::new(&report.target)));
-    text + &format!("wrote {} and {json}, in {}\n", report.files.join(", "), folder.display())
+    text += &format!("wrote {} and {json}, in {}\n", report.files.join(", "), folder.display());
+    text + &kept_remark(&report.kept)
 }

@@ -9,7 +9,7 @@ use kinran_scene::{Document, LightKind, Material, Needs, Scene, TextureRef};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::bake::normal_remarks;
+use crate::bake::{format_name, normal_remarks};
 use crate::model::{ModelArgs, read_scene};
 use crate::render::triangles;
 use crate::table::list;
@@ -59,6 +59,21 @@ struct MapReport {
     channels: usize,
     bits: u32,
     uv_set: usize,
+    /// The KTX2 or DDS file with its mips.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    runtime: Option<RuntimeReport>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct RuntimeReport {
+    /// The image's URI; an image in a buffer has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<String>,
+    format: String,
+    levels: usize,
+    /// The filter that kinran made the mips with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    filter: Option<String>,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -86,7 +101,7 @@ pub(super) fn inspect(path: &Path, args: &ModelArgs, console: &Console) -> Resul
     });
     let materials = scene.materials.iter().enumerate().map(|(i, m)| MaterialReport {
         name: m.name.clone(),
-        maps: maps(&scene, m),
+        maps: maps(&scene, document.as_ref(), m),
         bake: bake(&scene, i),
         ignored_extensions: m.ignored_extensions.clone(),
     });
@@ -120,7 +135,7 @@ pub(super) fn inspect(path: &Path, args: &ModelArgs, console: &Console) -> Resul
     console.result(&super::Report::Model(report), &text)
 }
 
-fn maps(scene: &Scene, m: &Material) -> Vec<MapReport> {
+fn maps(scene: &Scene, document: Option<&Document>, m: &Material) -> Vec<MapReport> {
     let anisotropy = m.anisotropy.as_ref().and_then(|a| a.texture.as_ref());
     let diffuse_transmission = m.diffuse_transmission.as_ref();
     let slots: [(&str, Option<&TextureRef>); 9] = [
@@ -134,6 +149,16 @@ fn maps(scene: &Scene, m: &Material) -> Vec<MapReport> {
         ("diffuseTransmission", diffuse_transmission.and_then(|d| d.texture.as_ref())),
         ("diffuseTransmissionColor", diffuse_transmission.and_then(|d| d.color.as_ref())),
     ];
+    let runtime = |image: usize| -> Option<RuntimeReport> {
+        let texture = scene.textures.get(image)?.as_ref()?;
+        let uri = document.and_then(|d| d.json().get("images")?.get(image)?.get("uri")?.as_str());
+        Some(RuntimeReport {
+            file: uri.map(|uri| if uri.starts_with("data:") { "data:".into() } else { uri.to_owned() }),
+            format: format_name(texture.format).into(),
+            levels: texture.levels.len(),
+            filter: texture.metadata.get("KinranFilter").cloned(),
+        })
+    };
     let report = |(slot, place): (&'static str, Option<&TextureRef>)| {
         let place = place?;
         let image = scene.images.get(place.image)?.as_ref()?;
@@ -148,9 +173,19 @@ fn maps(scene: &Scene, m: &Material) -> Vec<MapReport> {
                 Pixels::F32(_) => 32,
             },
             uv_set: place.uv_set,
+            runtime: place.runtime.and_then(runtime),
         })
     };
     slots.into_iter().filter_map(report).collect()
+}
+
+impl RuntimeReport {
+    fn text(&self) -> String {
+        let file = self.file.as_deref().unwrap_or("the file");
+        let filter = self.filter.as_ref().map_or_else(String::new, |filter| format!(", filter {filter}"));
+        let levels = counted(self.levels, "level", "levels");
+        format!("; mips in {file}: {}, {levels}{filter}", self.format)
+    }
 }
 
 /// What `kinran bake` does with a material, in words.
@@ -209,8 +244,10 @@ fn text(report: &Report) -> String {
     for m in &report.materials {
         let mut rows = vec![row("  bake", m.bake.clone())];
         rows.extend(m.maps.iter().map(|map| {
-            let MapReport { slot, width, height, channels, bits, uv_set } = map;
-            row(&format!("  {slot}"), format!("{width}x{height}, {channels} x {bits} bits, UV set {uv_set}"))
+            let MapReport { slot, width, height, channels, bits, uv_set, runtime } = map;
+            let mips = runtime.as_ref().map_or_else(String::new, RuntimeReport::text);
+            let text = format!("{width}x{height}, {channels} x {bits} bits, UV set {uv_set}{mips}");
+            row(&format!("  {slot}"), text)
         }));
         if !m.ignored_extensions.is_empty() {
             rows.push(row("  ignored", m.ignored_extensions.join(", ")));

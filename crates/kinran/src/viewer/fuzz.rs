@@ -6,6 +6,7 @@ use kinran_render::reference::RenderFuzz;
 use kinran_scene::{Fuzz, FuzzAttenuation, FuzzLayer, FuzzPhase};
 use serde::{Deserialize, Serialize};
 
+use crate::Progress;
 use crate::surfaces::fuzz_fits;
 
 /// What [`FuzzParameters::kind`] counts.
@@ -82,7 +83,7 @@ impl FuzzParameters {
             2 => Fuzz::Simple { fuzziness: self.fuzziness, texture: None },
             _ => return None,
         };
-        let fits = (self.kind == 1).then(|| fuzz_fits(phase, self.spread));
+        let fits = (self.kind == 1).then(|| fuzz_fits(phase, self.spread, &Progress::default()));
         let texture = |of: fn(&RenderFuzz) -> &Option<kinran_render::reference::BoundTexture>| {
             loaded.as_ref().and_then(|loaded| of(loaded).clone())
         };

@@ -215,7 +215,7 @@ impl Work {
                     Model::open(&path, &args.model, &Progress::new(false))?;
                 let view = View::new(&scene, &path.to_string_lossy(), &args)?;
                 let plain = vec![None; scene.materials.len()];
-                let prepared = view.scene(&scene, plain)?;
+                let prepared = view.scene(&scene, plain, &Progress::new(false))?;
                 let warnings = scene.warnings.iter().chain(view.environment_notes()).cloned().collect();
                 let opened = Opened {
                     name: path.to_string_lossy().into_owned(),

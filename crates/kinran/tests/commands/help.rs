@@ -105,6 +105,12 @@ fn completions_and_manual_pages_know_every_command() {
             assert!(pages.contains(&format!("kinran-{name}.1")), "{name}: {pages:?}");
         }
         assert!(script.out.contains("dry-run"), "{shell}: no flags");
+        // The others complete no values.
+        let has_values = ["bash", "zsh", "fish"].contains(&shell);
+        for filter in kinran_bake::aniso::Filter::ALL.into_iter().filter(|_| has_values) {
+            let name = filter.name();
+            assert!(script.out.contains(name), "{shell}: --filter has no {name}");
+        }
     }
     let page = std::fs::read_to_string(out.join("kinran-detail-solve.1")).unwrap();
     assert!(page.contains("layer") && page.contains("kinran detail solve"), "{page}");

@@ -309,6 +309,12 @@ fn a_folder_of_baked_textures_is_laid_on_a_board() {
     assert!(middle[0] > 80 && middle[0] > 2 * middle[1], "a red board, got {middle:?}");
 
     refused(&["render", text(&baked), "-o", text(&out), "--filter", "ml"], &["no maps to bake"]);
+    for command in ["compare", "skin"] {
+        refused(
+            &[command, text(&baked), "-o", text(&folder.path().join("new"))],
+            &["no model", "kinran render"],
+        );
+    }
     std::fs::remove_file(baked.join("tin_normal.ktx2")).unwrap();
     refused(&["render", text(&baked), "-o", text(&out)], &["tin_normal.ktx2"]);
     refused(&["render", text(&maps), "-o", text(&out)], &["no .glb", "bake one"]);

@@ -285,6 +285,49 @@ fn a_file_that_kinran_did_not_write_is_lost() {
     }
 }
 
+/// Who bakes for one engine, then for another, then for the first again has both sets, and knows which are in use.
+#[test]
+fn files_of_an_earlier_container_are_forgotten() {
+    let (_folder, model) = square();
+    let (maps, out) = (maps(), tempfile::tempdir().unwrap());
+    let wall = maps.path().join("a_ao.png");
+    let layer = format!("{},scale=2", text(&maps.path().join("a_rough.png")));
+    let cases: [&[&str]; 4] = [
+        &["bake", text(maps.path())],
+        &["bake", text(&model)],
+        &["skin-lut", "--size", "8x8"],
+        &["detail", "solve", text(&wall), "--kind", "data", "--layer", &layer],
+    ];
+    for (i, words) in cases.into_iter().enumerate() {
+        let out = out.path().join(i.to_string());
+        let run = |container: &str| kinran(&[words, &["-o", text(&out), "--container", container]].concat());
+        let named = |extension: &str| -> Vec<String> {
+            files(&out).into_iter().filter(|f| f.ends_with(extension)).collect()
+        };
+        let first = run("ktx2");
+        assert_eq!(
+            (first.code, first.out.contains("earlier run")),
+            (Some(0), false),
+            "{words:?}: {}",
+            first.err
+        );
+        let kept = named(".ktx2");
+        for (container, stays) in [("dds", kept.clone()), ("ktx2", Vec::new())] {
+            let stays = if stays.is_empty() { named(".dds") } else { stays };
+            let said = run(container);
+            assert_eq!(said.code, Some(0), "{words:?} as {container}: {}", said.err);
+            let line = said.out.lines().find(|line| line.contains("earlier run")).unwrap_or_default();
+            let wanted = &stays[0];
+            assert!(line.contains(wanted), "{words:?} as {container}: wanted {wanted}, got {}", said.out);
+        }
+        assert_eq!(named(".ktx2"), kept, "{words:?}");
+        // What somebody edits in the meantime is no longer Kinran's.
+        std::fs::write(out.join(&kept[0]), "mine").unwrap();
+        assert_eq!(run("dds").code, Some(0), "{words:?}");
+        refused(&[words, &["-o", text(&out)]].concat(), &[&kept[0], "--force"]);
+    }
+}
+
 #[test]
 fn shaders_and_pages_of_others_are_overwritten() {
     let folder = tempfile::tempdir().unwrap();

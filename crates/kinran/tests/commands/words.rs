@@ -1,6 +1,6 @@
 //! Words that people read: of files that are not there, of what cannot be read, of one and of several.
 
-use kinran_image::write_png;
+use kinran_image::{Channels, Image, Pixels, write_png};
 
 use crate::common::{bumps, glb, kinran, refused, square, text};
 
@@ -70,6 +70,43 @@ fn one_is_told_as_many_and_what_is_not_marked_as_marked() {
     let said = kinran(&[&["compare", text(&model), "-o", text(&out)], &few[..]].concat());
     assert_eq!(said.code, Some(0), "{}", said.err);
     assert!(!said.out.contains("is marked") && said.out.contains("\"Noise\""), "{}", said.out);
+}
+
+#[test]
+fn a_folder_with_one_model_is_drawn_but_not_compared() {
+    let (folder, _model) = square();
+    let out = folder.path().join("out");
+    let few = ["--size", "8", "--distances", "1", "--filters", "linear", "--truth-spp", "8", "--spp", "8"];
+    let said = kinran(&[&["compare", text(folder.path()), "-o", text(&out)], &few[..]].concat());
+    assert_eq!(said.code, Some(0), "{}", said.err);
+}
+
+#[test]
+fn a_model_hides_the_files_that_its_mips_are_in() {
+    let (folder, model) = square();
+    let out = folder.path().join("out");
+    let baked = out.join("square.glb");
+    assert_eq!(kinran(&["bake", text(&model), "-o", text(&out), "--filter", "linear"]).code, Some(0));
+    let said = kinran(&["inspect", text(&baked)]);
+    assert!(
+        said.out.contains("square_hammered_normal.ktx2: bc5") && said.out.contains("filter linear"),
+        "{}",
+        said.out
+    );
+    assert!(!kinran(&["inspect", text(&model)]).out.contains("mips in"));
+}
+
+#[test]
+fn a_dry_run_finds_less_than_the_bake() {
+    let folder = tempfile::tempdir().unwrap();
+    let photo = Image::new(8, 8, Channels::Rgb, Pixels::U8((0..192).map(|i| (i * 37 % 251) as u8).collect()))
+        .unwrap();
+    write_png(&folder.path().join("tin_normal.png"), &photo).unwrap();
+    let out = folder.path().join("out");
+    for more in ["--quiet", "--dry-run"] {
+        let words = ["bake", text(folder.path()), "-o", text(&out), "--roughness", "0.5", more];
+        refused(&words, &["tin_normal.png", "normal"]);
+    }
 }
 
 #[test]
