@@ -676,16 +676,18 @@ fn a_saved_input_is_not_noticed() {
     let first = library.output();
     let input = library.path("materials/cloth00/normal.png");
     let told = tempfile::NamedTempFile::new().unwrap();
-    let said = told.reopen().unwrap();
-    let _watching =
-        Watching(library.command(&["--watch"]).stdout(said).stderr(Stdio::null()).spawn().unwrap());
+    let log = told.reopen().unwrap();
+    let mut command = library.command(&["--watch"]);
+    command.stderr(log.try_clone().unwrap()).stdout(log);
+    let _watching = Watching(command.spawn().unwrap());
+    let said = || fs::read_to_string(told.path()).unwrap();
+    wait("the first look", || said().contains("watching"));
     fs::write(&input, normals(5)).unwrap();
     wait("a changed map", || {
         library.output()["cloth00/cloth00_normal.ktx2"] != first["cloth00/cloth00_normal.ktx2"]
     });
     wait("what was baked, by its name", || {
-        let said = fs::read_to_string(told.path()).unwrap();
-        said.lines().any(|line| line.contains("cloth00") && line.contains(" baked "))
+        said().lines().any(|line| line.contains("cloth00") && line.contains("baked"))
     });
     // A file that is no image for a moment does not end the watch.
     fs::write(&input, "half").unwrap();
