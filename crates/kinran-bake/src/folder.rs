@@ -665,7 +665,10 @@ fn folder_name(folder: &Path) -> String {
 /// Gives files the roles that `--map` says, and takes out those that `--ignore` names.
 fn apply_flags(folder: &Path, hints: &Hints, found: &mut Vec<Found>) -> Result<(), FolderError> {
     let position = |found: &[Found], path: &Path| {
-        found.iter().position(|f| f.path == path || f.path == folder.join(path))
+        let named = found.iter().position(|f| f.path == path || f.path == folder.join(path));
+        // Wherever it lies below the folder, where its name is the only one.
+        let mut by_name = (0..found.len()).filter(|&i| found[i].path.file_name() == Some(path.as_os_str()));
+        named.or_else(|| by_name.next().filter(|_| by_name.next().is_none()))
     };
     for path in &hints.ignore {
         let Some(at) = position(found, path) else {

@@ -774,6 +774,13 @@ fn an_archives_inner_folder_is_not_looked_into() {
     for name in ["textures/normal.png", "textures/LICENSE", "rock.blend", "preview.png"] {
         assert!(folder.rows.iter().any(|row| row.file == name), "no {name} in\n{}", folder.table());
     }
+    // A file is named as it is called, or by its place.
+    for named in ["roughness.png", "textures/roughness.png"] {
+        let hints = Hints { ignore: vec![named.into()], ..Hints::default() };
+        let folder = scan(dir.path(), &hints).unwrap_or_else(|e| panic!("{named}: {e}"));
+        let row = folder.rows.iter().find(|row| row.file == "textures/roughness.png").unwrap();
+        assert!(row.note.contains("--ignore"), "{named}: {row:?}");
+    }
     // Its own maps go before, and so does a model that they belong to.
     for own in ["own_normal.png", "rock.gltf"] {
         fs::write(dir.path().join(own), b"").unwrap();
