@@ -836,6 +836,12 @@ fn understand(
 
     // Which of the ways to say the same is meant.
     settle_unread(material, files)?;
+    // A map called after anisotropy beside one of the direction is the level: it need not tell the direction again.
+    let has = |files: &[Found], roles: &[Role]| files.iter().any(|f| roles.iter().any(|&role| f.is(role)));
+    if has(files, &[Direction, DirectionAngle]) && !has(files, &[AnisotropyLevel]) {
+        let named = files.iter_mut().filter(|f| f.is(Anisotropy) && !f.forced);
+        named.for_each(|f| f.role = Some(AnisotropyLevel));
+    }
     let mut twins = Vec::new();
     let groups: [(&str, &[&[Role]]); 4] = [
         (

@@ -762,6 +762,26 @@ fn a_variant_that_nothing_speaks_for_is_told() {
 }
 
 #[test]
+fn a_level_beside_a_direction_is_taken_for_a_second_direction() {
+    for direction in ["steel_direction.png", "steel_anisotropy_angle.png"] {
+        let names = ["steel_normal.png", "steel_roughness.png", "steel_anisotropy.png", direction];
+        let of = |hints: &Hints| {
+            let material = only(&names, hints);
+            material
+                .files
+                .iter()
+                .find(|(_, path)| path.ends_with("steel_anisotropy.png"))
+                .map(|(role, _)| *role)
+        };
+        assert_eq!(of(&Hints::default()), Some(Role::AnisotropyLevel), "beside {direction}");
+        // Who says that it is glTF's map is believed.
+        let dir = folder_of(&names);
+        let said = scan(dir.path(), &maps(&[(Role::Anisotropy, "steel_anisotropy.png")]));
+        assert!(said.is_ok(), "{}", said.unwrap_err());
+    }
+}
+
+#[test]
 fn an_archives_inner_folder_is_not_looked_into() {
     let dir = folder_of(&["rock.blend", "preview.png"]);
     let inner = dir.path().join("textures");

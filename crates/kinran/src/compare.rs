@@ -248,6 +248,10 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     Ok(())
 }
 
+/// What there is to say of a model that looks the same with every filter.
+const NO_MAPS: &str = "no material has a normal, roughness or anisotropy map: there is nothing to filter, and all filters draw \
+                       the same";
+
 /// The name of a picture of a filter or of ground truth.
 fn picture_file(series: &str, distance: f32) -> String {
     format!("{series}_x{distance}.png")
@@ -316,7 +320,8 @@ pub fn compare(
 
     let (surfaces, apart) = scene_surfaces(scene, Mips::Level0, progress)?;
     let told = scene.warnings.iter().chain(options.view.environment_notes()).cloned();
-    let warnings = told.chain(apart).collect();
+    let bare = surfaces.iter().all(Option::is_none).then(|| NO_MAPS.to_owned());
+    let warnings = told.chain(apart).chain(bare).collect();
     let mut prepared = options.view.scene(scene, surfaces, progress)?;
     let mut truth = Vec::new();
     let mut drawn: Vec<Vec<Taken>> = vec![Vec::new(); options.filters.len()];

@@ -23,7 +23,7 @@ use crate::demo::noise::noise;
 use crate::model::Model;
 use crate::picture::{Picture, Row, grid};
 use crate::surfaces::{Mips, fuzz_fits, scene_surfaces};
-use crate::values::{number, vector};
+use crate::values::{counted, number, vector};
 use crate::view::{EnvironmentChoice, View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, outputs};
 
@@ -260,8 +260,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     for Difference { light, flip } in &flip {
         writeln!(text, "FLIP {flip:.4}: {light}").expect("strings grow");
     }
-    write!(text, "{} sheets of {} are in {}", files.len(), file_name(&args.file), output.display())
-        .expect("strings grow");
+    let sheets = counted(files.len(), "sheet of", "sheets of");
+    write!(text, "{sheets} {}: in {}", file_name(&args.file), output.display()).expect("strings grow");
     console.result(&Summary { files, flip, warnings }, &text)?;
     outputs::tell_place(console, args.output.as_deref(), &output);
     Ok(())

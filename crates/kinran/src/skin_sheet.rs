@@ -27,7 +27,7 @@ use crate::picture::{Color, INK, PAPER, Picture, Row, grid};
 use crate::skin::{SIZE, profile, skin_table};
 use crate::skin_lut::plot::plot;
 use crate::surfaces::{Mips, scene_surfaces};
-use crate::values::{number, vector};
+use crate::values::{counted, number, vector};
 use crate::view::{View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, outputs};
 
@@ -206,7 +206,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         files.push(name);
     }
     drop(all);
-    let text = format!("{} sheets of {} are in {}", files.len(), file_name(&args.file), output.display());
+    let sheets = counted(files.len(), "sheet of", "sheets of");
+    let text = format!("{sheets} {}: in {}", file_name(&args.file), output.display());
     console.result(&Summary { files, warnings }, &text)?;
     outputs::tell_place(console, args.output.as_deref(), &output);
     Ok(())
@@ -423,7 +424,9 @@ impl Studio<'_> {
         let (apart, gain) = enlarged_differences(&pictures[1], &pictures[2]);
         pictures.push(apart);
         let change = match gain {
-            None => "what direction changes: nothing that shows, since nothing here is a ridge".to_owned(),
+            None => {
+                "what direction changes: nothing that shows at this size; --unit-mm says another".to_owned()
+            }
             Some(gain) => format!("what direction changes, {gain} times enlarged"),
         };
         let names = [
@@ -733,7 +736,9 @@ fn enlarged_differences(a: &[Picture], b: &[Picture]) -> (Vec<Picture>, Option<u
     seen.sort_unstable();
     let most = u32::from(seen.get(seen.len() * 99 / 100).copied().unwrap_or(255));
     let gain = [1, 2, 4, 8, 16, 32].into_iter().rev().find(|gain| gain * most <= 255).unwrap_or(1);
-    let gain = (!seen.is_empty() && most >= SEEN).then_some(gain);
+    let all: usize = apart.iter().map(Vec::len).sum();
+    let shows = seen.iter().filter(|&&c| u32::from(c) >= SEEN).count() as f32 >= SEEN_SHARE * all as f32;
+    let gain = shows.then_some(gain);
     let color = |c: u8| false_color((u32::from(c) * gain.unwrap_or(0)) as f32 / 255.0);
     let pictures = a.iter().zip(apart).map(|(a, apart)| Picture {
         width: a.width,
@@ -745,6 +750,9 @@ fn enlarged_differences(a: &[Picture], b: &[Picture]) -> (Vec<Picture>, Option<u
 
 /// Steps of 8 bits from which a difference shows beside another picture; chosen by eye.
 const SEEN: u32 = 2;
+
+/// Share of all pixels that must differ so, or it is noise along edges; chosen by eye.
+const SEEN_SHARE: f32 = 0.003;
 
 /// Behind curvature; chosen by eye.
 const BACKDROP: Color = [58, 60, 66];
