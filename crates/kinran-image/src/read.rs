@@ -65,19 +65,30 @@ pub fn read_layer(path: &Path, layer: Option<&str>) -> Result<Image, Error> {
     if file.metadata().map_err(|e| Error::io(path, e))?.is_dir() {
         return Err(Error::io(path, std::io::ErrorKind::IsADirectory.into()));
     }
-    decode(path, BufReader::with_capacity(1 << 16, file), layer)
+    decode(
+        path,
+        BufReader::with_capacity(1 << 16, file),
+        layer,
+        "say which is meant with --exr-layer, or save that one alone",
+    )
 }
 
 /// Decodes an image file that is in memory already; `name` stands for it in errors, and its extension
-/// tells a TGA. See [`read_image`].
+/// tells a TGA. Of several layers nobody can name one. See [`read_image`].
 ///
 /// # Errors
 /// As [`read_image`].
 pub fn decode_image(name: &Path, bytes: &[u8]) -> Result<Image, Error> {
-    decode(name, Cursor::new(bytes), None)
+    decode(name, Cursor::new(bytes), None, "save the one that is meant alone")
 }
 
-fn decode<R: BufRead + Seek + Send>(name: &Path, mut file: R, layer: Option<&str>) -> Result<Image, Error> {
+/// `advice` is for files with several layers.
+fn decode<R: BufRead + Seek + Send>(
+    name: &Path,
+    mut file: R,
+    layer: Option<&str>,
+    advice: &str,
+) -> Result<Image, Error> {
     let size = file.seek(SeekFrom::End(0)).map_err(|e| Error::io(name, e))?;
     file.rewind().map_err(|e| Error::io(name, e))?;
     let mut magic = Vec::new();
@@ -101,7 +112,7 @@ fn decode<R: BufRead + Seek + Send>(name: &Path, mut file: R, layer: Option<&str
         [0xff, 0xd8, 0xff, ..] => ("JPEG", jpeg::decode(file, size)),
         [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => ("TIFF", tiff::decode(file, size)),
         [b'#', b'?', ..] => ("HDR", hdr::decode(file, size)),
-        _ if is_exr => ("EXR", exr::decode(file, size, layer)),
+        _ if is_exr => ("EXR", exr::decode(file, size, layer, advice)),
         [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => {
             // No bound by the file's bytes: a picture of one colour takes none for its texels, of any size. The longest
             // side is 16384, so no header asks for more than 1 GiB.

@@ -35,8 +35,16 @@ impl Environment {
     /// # Errors
     /// The image's own, and for images that are not twice as wide as high or that hold no floats.
     pub fn load(path: impl AsRef<Path>) -> Result<Environment, Error> {
+        Environment::load_layer(path, None)
+    }
+
+    /// Reads an environment, of an EXR the layer that is called so.
+    ///
+    /// # Errors
+    /// As [`Environment::load`]; and where `layer` is given, that the file has no such layer or is of a format without layers.
+    pub fn load_layer(path: impl AsRef<Path>, layer: Option<&str>) -> Result<Environment, Error> {
         let path = path.as_ref();
-        let image = kinran_image::read_image(path)?;
+        let image = kinran_image::read_layer(path, layer)?;
         let (width, height) = (image.width as usize, image.height as usize);
         if width != 2 * height {
             return Err(Error::malformed(

@@ -24,7 +24,7 @@ use crate::content::Content;
 use crate::init::{MANIFEST, Survey};
 use crate::model::ModelArgs;
 use crate::outputs::{Space, beside, check_folder, has_extension};
-use crate::values::{filter, number};
+use crate::values::{exr_layer, filter, number};
 use crate::{Console, Error};
 
 pub use curvature::{CurvatureArgs, CurvatureReport};
@@ -196,14 +196,6 @@ fn map(text: &str) -> Result<(MapRole, PathBuf), String> {
         text.split_once('=').ok_or_else(|| format!("write ROLE=FILE; roles are {}", roles()))?;
     let role = MapRole::all().find(|r| r.name() == role);
     role.map(|role| (role, PathBuf::from(file))).ok_or_else(|| format!("roles are {}", roles()))
-}
-
-/// `FILE=LAYER`.
-fn exr_layer(text: &str) -> Result<(PathBuf, String), String> {
-    match text.rsplit_once('=') {
-        Some((file, layer)) if !file.is_empty() && !layer.is_empty() => Ok((file.into(), layer.into())),
-        _ => Err("write FILE=LAYER, such as render.exr=View.Normal".into()),
-    }
 }
 
 /// How colour is encoded.

@@ -1,5 +1,7 @@
 //! What people type as flags.
 
+use std::path::{Path, PathBuf};
+
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::Vec3;
 use kinran_bake::aniso::Filter;
@@ -35,6 +37,28 @@ pub(crate) fn number(text: &str, range: std::ops::RangeInclusive<f32>) -> Result
         Ok(x) if range.contains(&x) => Ok(x),
         _ => Err(format!("write a number from {} to {}", range.start(), range.end())),
     }
+}
+
+/// `FILE=LAYER`.
+pub(crate) fn exr_layer(text: &str) -> Result<(PathBuf, String), String> {
+    match text.rsplit_once('=') {
+        Some((file, layer)) if !file.is_empty() && !layer.is_empty() => Ok((file.into(), layer.into())),
+        _ => Err("write FILE=LAYER, such as render.exr=View.Normal".into()),
+    }
+}
+
+/// The layer that flags name for a file, which they call by its path, from here or from `folder`, or by its name.
+pub(crate) fn exr_layer_of<'a>(
+    layers: &'a [(PathBuf, String)],
+    file: &Path,
+    folder: &Path,
+) -> Option<&'a str> {
+    let is_it = |path: &PathBuf| {
+        file == path
+            || file == folder.join(path)
+            || file.file_name().is_some_and(|name| path == Path::new(name))
+    };
+    layers.iter().rev().find(|(path, _)| is_it(path)).map(|(_, layer)| layer.as_str())
 }
 
 /// "1 file", "2 files".

@@ -33,6 +33,10 @@ pub struct ViewArgs {
         value_parser = |t: &str| number(t, -36000.0..=36000.0))]
     pub env_rotation: f32,
 
+    /// Which layer of the environment's EXR file is meant
+    #[arg(long, help_heading = "Light", value_name = "LAYER")]
+    pub exr_layer: Option<String>,
+
     /// Samples of the environment's reflection for each sample of a pixel
     #[arg(long, help_heading = "Light", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=1024))]
     pub env_samples: u32,
@@ -95,6 +99,11 @@ pub struct ViewArgs {
 }
 
 impl ViewArgs {
+    /// The layer of an environment's file that the flag names: that of the command line's file.
+    pub(crate) fn layer_of(&self, choice: &EnvironmentChoice) -> Option<String> {
+        self.exr_layer.clone().filter(|_| *choice == self.env)
+    }
+
     /// Refuses pictures that would overwrite the model, a file that it names, or the environment. Other pictures are
     /// written again without a question, as renderers do.
     ///
@@ -263,7 +272,7 @@ impl View {
                 Error::flag_error_of(file, format!("--camera {n}"), reason)
             })?,
         };
-        let environment = environment(&args.env, args.env_rotation)?;
+        let environment = environment(&args.env, args.exr_layer.as_deref(), args.env_rotation)?;
         let from_file = matches!(args.env, EnvironmentChoice::File(_));
         let default_background =
             if from_file { Background::Environment { blur: 0.0 } } else { Background::Color(BACKDROP) };
@@ -441,17 +450,34 @@ fn lights(scene: &Scene, args: &ViewArgs, camera: &Camera) -> Vec<Light> {
     }
 }
 
-/// The environment chosen, turned by so many degrees.
+/// The environment chosen, of an EXR the layer that is called so, turned by so many degrees.
 ///
 /// # Errors
-/// Those of [`Environment::load`].
-pub(crate) fn environment(choice: &EnvironmentChoice, rotation: f32) -> Result<Option<Environment>, Error> {
+/// Those of [`Environment::load_layer`], and a layer of what is no file.
+pub(crate) fn environment(
+    choice: &EnvironmentChoice,
+    layer: Option<&str>,
+    rotation: f32,
+) -> Result<Option<Environment>, Error> {
+    refuse_layer(choice, layer)?;
     let environment = match choice {
         EnvironmentChoice::Studio => Some(Environment::studio()),
         EnvironmentChoice::None => None,
-        EnvironmentChoice::File(path) => Some(Environment::load(path)?),
+        EnvironmentChoice::File(path) => Some(Environment::load_layer(path, layer)?),
     };
     Ok(environment.map(|e| turned(e, rotation)))
+}
+
+/// Refuses a layer of what is no file.
+pub(crate) fn refuse_layer(choice: &EnvironmentChoice, layer: Option<&str>) -> Result<(), Error> {
+    match (choice, layer) {
+        (EnvironmentChoice::File(_), _) | (_, None) => Ok(()),
+        (EnvironmentChoice::Studio | EnvironmentChoice::None, Some(layer)) => {
+            let reason =
+                "only the .exr file of an environment has layers; name it with --env, or leave the flag out";
+            Err(Error::flag_error(format!("--exr-layer {layer}"), reason))
+        }
+    }
 }
 
 fn turned(environment: Environment, degrees: f32) -> Environment {

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use crate::model::Place;
 use crate::values::size;
-use crate::view::{EnvironmentChoice, ViewArgs};
+use crate::view::{EnvironmentChoice, ViewArgs, refuse_layer};
 use crate::{Console, Error};
 use app::{App, Outcome};
 use parameters::Parameters;
@@ -75,6 +75,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     }
     // A name that is mistyped is told before a window opens.
     args.file.as_deref().map(Place::of).transpose()?;
+    refuse_layer(&args.view.env, args.view.exr_layer.as_deref())?;
     if let EnvironmentChoice::File(path) = &args.view.env {
         std::fs::metadata(path).map_err(|e| kinran_image::Error::io(path, e))?;
     }

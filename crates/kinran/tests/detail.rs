@@ -72,6 +72,80 @@ fn run(words: &[String]) -> Value {
     kinran_json(&words.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
+/// The error about an EXR of several layers names a flag, which each of these commands must have.
+#[test]
+fn layers_of_an_exr_are_asked_for_by_a_flag_that_is_not_there() {
+    let folder = Folder::new();
+    let layers = |file: &str, size: (u32, u32)| {
+        let planes = ["Light", "Paint"].iter().flat_map(|layer| {
+            let value = if *layer == "Light" { 0.9 } else { 0.25 };
+            ["R", "G", "B"].map(|c| (format!("{layer}.{c}"), vec![value; (size.0 * size.1) as usize]))
+        });
+        let planes: Vec<(String, Vec<f32>)> = planes.collect();
+        let planes = planes.iter().map(|(name, plane)| (name.as_str(), plane.clone())).collect();
+        kinran_image::write_exr_planes(&folder.path(file), size, planes).unwrap();
+    };
+    for file in ["wall.exr", "brick.exr", "mask.exr"] {
+        layers(file, (64, 64));
+    }
+    let (wall, out) = (folder.text("wall.exr"), folder.text("out"));
+    let brick = format!("--layer={}", folder.text("brick.exr"));
+    let moss = format!("--layer={},mask={}", folder.text("moss.png"), folder.text("mask.exr"));
+    let solve =
+        ["detail", "solve", &wall, &brick, &moss, "-o", &out, "--format", "rgba8", "--tile-format", "rgba8"];
+    let flags = [format!("{wall}=Paint"), "brick.exr=Paint".into(), "mask.exr=Light".into()];
+    let mut words = solve.to_vec();
+    for (flag, file) in flags.iter().zip(["wall.exr", "brick.exr", "mask.exr"]) {
+        refused(&words, &[file, "Light, Paint", "--exr-layer"]);
+        words.extend(["--exr-layer", flag]);
+    }
+    kinran_json(&words);
+    refused(
+        &[&words[..], &["--exr-layer", "moss.exr=Paint"]].concat(),
+        &["--exr-layer moss.exr=Paint", "wall.exr"],
+    );
+    // Linear 0.25 is 137 in sRGB.
+    let tile = read_texture(&folder.path("out/brick.ktx2")).unwrap();
+    assert_eq!(tile.levels[0].data[..3], [137; 3]);
+
+    let manifest = folder.path("kinran.toml");
+    let entry = "[[detail]]\ninput = \"wall.exr\"\nlayer = \"brick.exr\"\nformat = \"rgba8\"\n\
+                 exr-layer = [\"wall.exr=Paint\", \"brick.exr=Paint\"]\n";
+    std::fs::write(&manifest, entry).unwrap();
+    kinran_json(&["bake", text(&manifest), "--cache", &folder.text("cache")]);
+
+    std::fs::create_dir_all(folder.path("all/paint")).unwrap();
+    std::fs::rename(folder.path("wall.exr"), folder.path("all/paint/paint_color.exr")).unwrap();
+    let (all, page) = (folder.text("all"), folder.text("page"));
+    let report = [
+        "detail",
+        "report",
+        &all,
+        "-o",
+        &page,
+        "--size",
+        "16",
+        "--format",
+        "bc1",
+        "--no-pictures",
+        "--no-fade",
+    ];
+    refused(&report, &["paint_color.exr", "Light, Paint", "--exr-layer"]);
+    kinran_json(&[&report[..], &["--exr-layer", "paint/paint_color.exr=Paint"]].concat());
+
+    layers("sky.exr", (64, 32));
+    let (sky, picture) = (folder.text("sky.exr"), folder.text("out.exr"));
+    let model = folder.text("square.glb");
+    std::fs::write(&model, common::glb()).unwrap();
+    let render =
+        ["render", &model, "-o", &picture, "--size", "8x8", "--spp", "1", "--fov", "1", "--distance", "100"];
+    refused(&[&render[..], &["--env", &sky]].concat(), &["sky.exr", "Light, Paint", "--exr-layer"]);
+    refused(&[&render[..], &["--exr-layer", "Light"]].concat(), &["--exr-layer Light", "--env"]);
+    kinran_json(&[&render[..], &["--env", &sky, "--exr-layer", "Paint"]].concat());
+    let corner = read_image(Path::new(&picture)).unwrap().texel(0, 0);
+    assert!((corner[0] - 0.25).abs() < 1e-3, "wanted the layer's 0.25 behind the model, got {corner:?}");
+}
+
 #[test]
 fn a_target_is_solved_into_textures_a_report_and_pictures() {
     let folder = Folder::new();

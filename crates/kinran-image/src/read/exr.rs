@@ -14,11 +14,12 @@ use half::f16;
 use super::{check_claims, finite_image, unassociate};
 use crate::{Channels, Image, Pixels, Transfer};
 
-/// The layer called `wanted`; without a name the one that has none, or the only one.
+/// The layer called `wanted`; without a name the one that has none, or the only one, else `advice` is given.
 pub(super) fn decode(
     mut file: impl Read + Seek + Send,
     stored: u64,
     wanted: Option<&str>,
+    advice: &str,
 ) -> Result<Image, String> {
     let damaged = |e: exr::error::Error| match e {
         exr::error::Error::NotSupported(e) => format!("{e}; save it flat, with ZIP compression"),
@@ -30,7 +31,7 @@ pub(super) fn decode(
         return Err("it holds deep data; save it without, or flatten it".into());
     }
     let layers = layers(&meta.headers);
-    let layer = &layers[choose(&layers, wanted)?];
+    let layer = &layers[choose(&layers, wanted, advice)?];
     let header = &meta.headers[layer.part];
 
     let side = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
@@ -155,7 +156,7 @@ fn image_of(channels: &[(usize, String)]) -> (Vec<usize>, bool) {
 }
 
 /// Which layer is meant.
-fn choose(layers: &[Layer], wanted: Option<&str>) -> Result<usize, String> {
+fn choose(layers: &[Layer], wanted: Option<&str>, advice: &str) -> Result<usize, String> {
     let images: Vec<usize> = (0..layers.len()).filter(|&i| !layers[i].planes.is_empty()).collect();
     let names = |of: &[usize]| {
         let names: Vec<String> = of.iter().map(|&i| called(&layers[i])).collect();
@@ -178,10 +179,7 @@ fn choose(layers: &[Layer], wanted: Option<&str>) -> Result<usize, String> {
     let unnamed: Vec<usize> = images.iter().copied().filter(|&i| layers[i].name.is_empty()).collect();
     match (&unnamed[..], &images[..]) {
         ([only], _) | ([], [only]) => Ok(*only),
-        _ => Err(format!(
-            "it has several layers, {}, and none without a name; say which is meant with --exr-layer, or save that one alone",
-            names(&images)
-        )),
+        _ => Err(format!("it has several layers, {}, and none without a name; {advice}", names(&images))),
     }
 }
 

@@ -59,6 +59,7 @@ impl Flags {
                     layer.tile = file(&layer.tile);
                     layer.mask = layer.mask.as_deref().map(&mut *file);
                 }
+                args.exr_layer.iter_mut().for_each(|(path, _)| *path = file(path));
                 args.model = args.model.as_deref().map(file);
             }
             Flags::Skin(args) => args.profile = args.profile.as_deref().map(file),
@@ -121,6 +122,11 @@ pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestErr
         for layer in &mut args.layer {
             layer.tile = manifest.beside(&layer.tile);
             layer.mask = layer.mask.as_ref().map(|mask| manifest.beside(mask));
+        }
+        let images: Vec<PathBuf> = args.images().cloned().collect();
+        for (path, _) in &mut args.exr_layer {
+            let known = images.iter().find(|image| image.file_name() == Some(path.as_os_str()));
+            *path = known.cloned().unwrap_or_else(|| manifest.beside(&*path));
         }
         args.model = args.model.as_ref().map(|model| manifest.beside(model));
         args.trust.allow_outside.iter_mut().for_each(|folder| *folder = manifest.beside(&*folder));

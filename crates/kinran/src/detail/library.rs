@@ -14,7 +14,7 @@ use kinran_bake::detail::{
     Tile, TileOptions, bearable_opacity, compare, level_pictures,
 };
 use kinran_bake::folder::{Green, Role, named_maps};
-use kinran_image::{Channels, Encoding, Image, Level, Pixels, encode_png, read_image, write_atomically};
+use kinran_image::{Channels, Encoding, Image, Level, Pixels, encode_png, read_layer, write_atomically};
 use kinran_scene::Wrap;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -23,6 +23,7 @@ use serde::Serialize;
 use super::{BlockFormat, KindName, page};
 use crate::outputs::{check_folder, named_after, refuse_other_page, tell_place};
 use crate::table::table;
+use crate::values::{exr_layer, exr_layer_of};
 use crate::{Console, Error};
 
 /// Paints a target over every material of a folder, solves each and reports the errors: report.json and index.html
@@ -60,6 +61,10 @@ pub struct LibraryArgs {
     /// Side of the targets in texels
     #[arg(long, value_name = "TEXELS", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(16..=8192))]
     pub size: u32,
+
+    /// Which layer of an EXR file holds the map, by its path in FOLDER or its name; may be given again
+    #[arg(long, value_name = "FILE=LAYER", value_parser = exr_layer)]
+    pub exr_layer: Vec<(PathBuf, String)>,
 
     /// Centre the histograms of the tiles
     #[arg(long)]
@@ -490,7 +495,8 @@ fn read_maps(folder: &Path, args: &LibraryArgs) -> Result<Vec<MapFile>, Error> {
             continue;
         }
         let y_down = green == Some(Green::Down);
-        maps.push(MapFile { role, kind, y_down, image: read_image(&file)? });
+        let image = read_layer(&file, exr_layer_of(&args.exr_layer, &file, &args.folder))?;
+        maps.push(MapFile { role, kind, y_down, image });
     }
     if args.wants(MapKind::Aniso) && !maps.iter().any(|map| map.role == Role::Aniso) {
         maps.extend(aniso_map(&maps)?);

@@ -10,7 +10,7 @@ use kinran_bake::detail::{
 };
 use kinran_bake::folder::{Green, guess_green, named_role, not_normals};
 use kinran_image::{
-    Image, encode_dds, encode_ktx2, encode_png, image_size, read_image, read_texture, write_atomically,
+    Image, encode_dds, encode_ktx2, encode_png, image_size, read_layer, read_texture, write_atomically,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -26,7 +26,7 @@ use crate::outputs::{
     kept_remark, refuse_foreign, refuse_input, replaced_bytes, tell_place,
 };
 use crate::table::table;
-use crate::values::number;
+use crate::values::{exr_layer, exr_layer_of, number};
 use crate::{Console, Error, Stage};
 
 /// Solves one target: writes NAME_synthesized, its tiles as they were compressed, and NAME.detail.json
@@ -87,6 +87,10 @@ pub struct SolveArgs {
     /// Green of a normal target grows downwards (DirectX)
     #[arg(long)]
     pub y_down: bool,
+
+    /// Which layer of an EXR file holds the target, a tile or a mask; may be given again
+    #[arg(long, value_name = "FILE=LAYER", value_parser = exr_layer)]
+    pub exr_layer: Vec<(PathBuf, String)>,
 
     /// Overlay as it is, instead of the smooth one
     #[arg(long)]
@@ -173,6 +177,17 @@ impl SolveArgs {
         by_flag
             .or_else(|| Some((KindName::of_file(&self.target)?, KindSource::Name)))
             .unwrap_or((KindName::Color, KindSource::Assumed))
+    }
+
+    /// The files that are read: the target, tiles and masks.
+    pub(crate) fn images(&self) -> impl Iterator<Item = &PathBuf> {
+        let of_layers = self.layer.iter().flat_map(|layer| [Some(&layer.tile), layer.mask.as_ref()]);
+        std::iter::once(&self.target).chain(of_layers.flatten())
+    }
+
+    /// Reads an image, of an EXR the layer that `--exr-layer` names.
+    fn read(&self, file: &Path) -> Result<Image, kinran_image::Error> {
+        read_layer(file, exr_layer_of(&self.exr_layer, file, Path::new("")))
     }
 
     /// What the target holds: by flag, else by its name, else colour.
@@ -266,6 +281,14 @@ pub(crate) fn space(args: &SolveArgs) -> Space {
 /// Refuses what cannot be written, before anything is read.
 fn check(args: &SolveArgs, console: &Console) -> Result<(), Error> {
     let packed = model::check(args)?;
+    for flag in &args.exr_layer {
+        let acts = |file: &PathBuf| exr_layer_of(std::slice::from_ref(flag), file, Path::new("")).is_some();
+        if !args.images().any(acts) {
+            let name = format!("--exr-layer {}={}", flag.0.display(), flag.1);
+            let reason = "neither the target nor a tile or mask is such a file";
+            return Err(Error::flag_error_of(&args.target, name, reason));
+        }
+    }
     let keys = tile_keys(args);
     let stem = file_stem(&args.target);
     let mut files = texture_files(args, &format!("{stem}_synthesized"));
@@ -327,7 +350,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     }
 
     // First, since compressing tiles takes a while.
-    let image = read_image(&args.target)?;
+    let image = args.read(&args.target)?;
     if kind_source == KindSource::Assumed && not_normals(&image).is_none() {
         let reason = "nothing says what the target holds, and its texels look like normals; give --kind normal, or --kind \
                       color where they are none";
@@ -489,7 +512,7 @@ fn read_tiles(
                     center: args.center && !is_mask,
                     ..TileOptions::new(kind, encoding)
                 };
-                read_image(file).and_then(|image| {
+                args.read(file).and_then(|image| {
                     if kind == MapKind::Normal {
                         warnings.extend(green_doubt(file, &image, y_down, "y-down of the layer"));
                     }

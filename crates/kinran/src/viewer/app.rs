@@ -464,7 +464,10 @@ impl App {
         }
         if wishes.light {
             match self.parameters.environment.parse() {
-                Ok(choice) => self.loader.ask(Job::Light(choice, self.parameters.environment_rotation)),
+                Ok(choice) => {
+                    let layer = self.args.layer_of(&choice);
+                    self.loader.ask(Job::Light(choice, layer, self.parameters.environment_rotation));
+                }
                 Err(error) => self.message = format!("environment: {error}"),
             }
         }
@@ -794,7 +797,8 @@ fn same_picture(a: &Parameters, b: &Parameters) -> bool {
 /// The view's flags with the environment that the parameters name.
 fn args_with_light(args: &ViewArgs, parameters: &Parameters) -> ViewArgs {
     let env: EnvironmentChoice = parameters.environment.parse().unwrap_or(EnvironmentChoice::Studio);
-    ViewArgs { env, env_rotation: parameters.environment_rotation, ..args.clone() }
+    let exr_layer = args.layer_of(&env);
+    ViewArgs { env, exr_layer, env_rotation: parameters.environment_rotation, ..args.clone() }
 }
 
 /// When a file of the shader folder was last saved.

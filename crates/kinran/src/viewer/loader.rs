@@ -28,8 +28,8 @@ pub(super) enum Job {
     Open(PathBuf, ViewArgs),
     /// The textures of a method.
     Bake(Mips),
-    /// Other light from all around: a choice, and its rotation in degrees.
-    Light(EnvironmentChoice, f32),
+    /// Other light from all around: a choice, the layer of its file, and its rotation in degrees.
+    Light(EnvironmentChoice, Option<String>, f32),
     /// What the baker made for the model of a number.
     Baked(u64, Mips, Result<Surfaces, Error>),
 }
@@ -257,8 +257,9 @@ impl Work {
                 self.surfaces.insert(mips, surfaces?);
                 self.bring(mips)
             }
-            Job::Light(choice, rotation) => {
-                let surroundings = environment(&choice, rotation)?.map(Surroundings::new).map(Arc::new);
+            Job::Light(choice, layer, rotation) => {
+                let surroundings =
+                    environment(&choice, layer.as_deref(), rotation)?.map(Surroundings::new).map(Arc::new);
                 if let Some((_, prepared)) = &mut self.model {
                     prepared.surroundings = surroundings;
                 }
