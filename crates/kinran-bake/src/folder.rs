@@ -27,7 +27,10 @@ use serde::Serialize;
 
 use crate::aniso::NormalZ;
 
-pub use evidence::{GREEN_CONFIDENCE, GreenGuess, green_correlation, guess_green, not_normals, odd_lengths};
+pub use evidence::{
+    GREEN_CONFIDENCE, GreenGuess, below_surface, colored, green_correlation, guess_green, not_normals,
+    odd_lengths, outside_unit,
+};
 pub use load::{LoadedMap, LoadedMaterial};
 pub use names::{Green, Role};
 pub use twins::Twin;
@@ -351,6 +354,7 @@ impl Folder {
 }
 
 /// A file on its way to being understood.
+#[derive(Clone)]
 struct Found {
     path: PathBuf,
     /// Its name in the folder.
@@ -365,6 +369,8 @@ struct Found {
     forced: bool,
     /// Why the file is not used, if it is not.
     dropped: Option<String>,
+    /// The materials that it is a map of, where there are several.
+    shared_by: Vec<String>,
     note: String,
 }
 
@@ -385,11 +391,17 @@ pub fn scan(folder: &Path, hints: &Hints) -> Result<Folder, FolderError> {
     let Listing { mut found, others, folders } = list(folder)?;
     apply_flags(folder, hints, &mut found)?;
     judge_letters(&mut found);
+    sets::share(&mut found);
 
     let (known, strangers): (Vec<Found>, Vec<Found>) = found.into_iter().partition(|f| f.role.is_some());
     let mut groups: BTreeMap<String, Vec<Found>> = BTreeMap::new();
     for file in known {
-        groups.entry(file.name.stem.to_lowercase()).or_default().push(file);
+        let own = [file.name.stem.clone()];
+        for stem in if file.shared_by.is_empty() { &own[..] } else { &file.shared_by[..] } {
+            let mut of_one = file.clone();
+            of_one.name.stem.clone_from(stem);
+            groups.entry(stem.to_lowercase()).or_default().push(of_one);
+        }
     }
 
     let mut result = Folder { rows: Vec::new(), materials: Vec::new() };
@@ -645,6 +657,7 @@ fn found_file(path: PathBuf) -> Found {
         path,
         forced: false,
         dropped: None,
+        shared_by: Vec::new(),
         note: String::new(),
     }
 }

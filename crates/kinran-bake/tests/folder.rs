@@ -423,6 +423,71 @@ fn sets_as_exporters_name_them_fall_apart_or_together() {
             &["Steel01_METALNESS: normal color", "Steel01_SPECULAR: normal gloss color"],
         ),
         (
+            "Poliigon, both workflows with one occlusion and one normal map",
+            &[
+                "Steel01_AO_2K.png",
+                "Steel01_NRM_2K.png",
+                "Steel01_COL_2K_METALNESS.png",
+                "Steel01_METALNESS_2K_METALNESS.png",
+                "Steel01_ROUGHNESS_2K_METALNESS.png",
+                "Steel01_COL_2K_SPECULAR.png",
+                "Steel01_GLOSS_2K_SPECULAR.png",
+                "Steel01_REFL_2K_SPECULAR.png",
+            ],
+            &[
+                "Steel01_METALNESS: normal roughness color occlusion metallic",
+                "Steel01_SPECULAR: normal gloss color occlusion",
+            ],
+        ),
+        (
+            "variants with one normal map",
+            &["W_Normal.png", "W_Rough_red.png", "W_Color_red.png", "W_Rough_blue.png", "W_Color_blue.png"],
+            &["W_blue: normal roughness color", "W_red: normal roughness color"],
+        ),
+        (
+            "a material beside its variants",
+            &[
+                "W_Normal.png",
+                "W_Rough.png",
+                "W_Rough_red.png",
+                "W_Color_red.png",
+                "W_Rough_blue.png",
+                "W_Color_blue.png",
+            ],
+            &["W: normal roughness", "W_blue: roughness color", "W_red: roughness color"],
+        ),
+        (
+            "a layer's maps called after their roles alone",
+            &[
+                "base_color.png",
+                "clearcoat_normal.png",
+                "coat_roughness.png",
+                "normal.png",
+                "sheen_roughness.png",
+            ],
+            &["x: normal color"],
+        ),
+        (
+            "a layer's maps beside those of the base",
+            &["rock_Coat_Normal.png", "rock_Coat_Color.png", "rock_Coat_Roughness.png", "rock_Normal.png"],
+            &["rock: normal"],
+        ),
+        (
+            "glTF's channels called after their roles alone",
+            &["base_color.png", "metallic_roughness.png", "normal.png"],
+            &["x: normal color metallic-roughness"],
+        ),
+        (
+            "what is worn as a coat",
+            &["Red_Coat_AO.png", "Red_Coat_Normal.png", "Red_Coat_Roughness.png"],
+            &["Red_Coat: normal roughness occlusion"],
+        ),
+        (
+            "what is worn as a coat, by names of layers alone",
+            &["Coat_Color.png", "Coat_Normal.png", "Coat_Roughness.png"],
+            &["Coat: normal roughness color"],
+        ),
+        (
             "Poliigon, some by metalness",
             &[
                 "Metal01_AO_2K.png",
@@ -721,8 +786,45 @@ fn sets_as_exporters_name_them_fall_apart_or_together() {
         ),
     ];
     for (what, names, wanted) in cases {
-        let folder = scanned(names, &Hints::default()).unwrap_or_else(|e| panic!("{what}: {e}"));
+        let outer = tempfile::tempdir().unwrap();
+        let dir = outer.path().join("x");
+        fs::create_dir(&dir).unwrap();
+        names.iter().for_each(|name| fs::write(dir.join(name), b"").unwrap());
+        let folder = scan(&dir, &Hints::default()).unwrap_or_else(|e| panic!("{what}: {e}"));
         assert_eq!(materials(&folder), *wanted, "{what}:\n{}", folder.table());
+    }
+}
+
+#[test]
+fn a_shared_map_has_a_row_of_each_material_and_a_layers_map_the_reason_why_it_is_not_used() {
+    let names = ["S_AO_2K.png", "S_COL_2K_METALNESS.png", "S_COL_2K_SPECULAR.png", "S_GLOSS_2K_SPECULAR.png"];
+    let folder = scanned(&names, &Hints::default()).unwrap();
+    let rows: Vec<_> = folder.rows.iter().filter(|row| row.file == names[0]).collect();
+    assert_eq!(rows.len(), 2, "{}", folder.table());
+    for row in rows {
+        assert_eq!(row.channels, "R occlusion", "{row:?}");
+        assert!(row.note.contains("shared by S_METALNESS and S_SPECULAR"), "{row:?}");
+    }
+    for (file, role) in [
+        ("coat_roughness.png", Role::Roughness),
+        ("clearcoat_normal.png", Role::Normal),
+        ("sheen_color.png", Role::Color),
+        ("diffuse_roughness.png", Role::Roughness),
+        ("bent_normal.png", Role::Normal),
+        ("rock_world_space_normal.png", Role::Normal),
+    ] {
+        let folder = scanned(&[file, "rock_ao.png"], &Hints::default()).unwrap();
+        let row = folder.rows.iter().find(|row| row.file == file).unwrap();
+        let flag = format!("--map {role}={file}");
+        assert_eq!((row.role, row.channels.as_str()), (Some(Role::Other), "-"), "{file}: {row:?}");
+        assert!(
+            row.note.starts_with("not used: by its name no") && row.note.contains(&flag),
+            "{file}: {row:?}"
+        );
+        let told = refused(&[file], &Hints::default());
+        assert!(told.contains("no maps found") && told.contains(file), "{file} alone: {told}");
+        let taken = only(&[file, "rock_ao.png"], &maps(&[(role, file)]));
+        assert!(taken.files.iter().any(|(own, _)| *own == role), "{flag}: {taken:?}");
     }
 }
 
@@ -1415,6 +1517,149 @@ fn normals_in_engine_textures_are_read() {
                 assert!(error < 3.0, "{name} {format:?} ({x}, {y}): wanted {wanted:?}, got {got:?}");
             }
         }
+    }
+}
+
+/// A float map as EXR, grey or of three or four channels.
+fn exr(path: &Path, side: u32, planes: &[(&str, Vec<f32>)]) {
+    let planes = planes.iter().map(|(name, plane)| (*name, plane.clone())).collect();
+    kinran_image::write_exr_planes(path, (side, side), planes).unwrap();
+}
+
+fn notes_of(dir: &Path, hints: &Hints) -> Vec<String> {
+    let folder = scan(dir, hints).unwrap();
+    assert_eq!(folder.materials.len(), 1, "{}", folder.table());
+    folder.materials[0].load().unwrap().notes
+}
+
+#[test]
+fn floats_outside_of_0_to_1_are_clamped_in_silence() {
+    let flat = image(4, Channels::Rgb, |_, _| [0.5, 0.5, 1.0, 1.0]);
+    // One texel of 16 above 1, one below 0.
+    let off: Vec<f32> = (0..16).map(|i| [1.75, -0.25].get(i).copied().unwrap_or(0.5)).collect();
+    // Half a step of 8 bits is rounding.
+    let rounded: Vec<f32> = (0..16).map(|i| if i == 3 { 1.0015 } else { 0.5 }).collect();
+    let grey = |plane: &Vec<f32>| vec![("Y", plane.clone())];
+    let rgb = |plane: &Vec<f32>| vec![("B", plane.clone()), ("G", plane.clone()), ("R", plane.clone())];
+    let half = vec![0.5; 16];
+    let khr = |plane: &Vec<f32>| vec![("B", plane.clone()), ("G", half.clone()), ("R", vec![1.0; 16])];
+    let rgba = |plane: &Vec<f32>| {
+        vec![("A", plane.clone()), ("B", vec![0.0; 16]), ("G", vec![0.0; 16]), ("R", vec![0.0; 16])]
+    };
+    type Planes<'a> = &'a dyn Fn(&Vec<f32>) -> Vec<(&'static str, Vec<f32>)>;
+    let cases: [(&str, &str, Planes, &[&str]); 9] = [
+        ("x_roughness.exr", "roughness", &grey, &[]),
+        ("x_gloss.exr", "gloss", &grey, &[]),
+        ("x_ao.exr", "occlusion", &grey, &[]),
+        ("x_metallic.exr", "metalness", &grey, &[]),
+        ("x_gloss_u.exr", "gloss along", &grey, &["x_gloss_v.png"]),
+        ("x_anisotropy_level.exr", "anisotropy level", &grey, &["x_roughness.png"]),
+        ("x_anisotropy.exr", "anisotropy strength", &khr, &["x_roughness.png"]),
+        ("x_orm.exr", "roughness", &rgb, &[]),
+        ("x_color.exr", "colour", &rgba, &[]),
+    ];
+    for (file, what, planes, beside) in cases {
+        let dir = painted(&[("x_normal_gl.png", &flat)]);
+        for file in beside {
+            write_png(&dir.path().join(file), &self::grey(0.5)).unwrap();
+        }
+        let hints = Hints { roughness: Some(0.5), ..Hints::default() };
+        exr(&dir.path().join(file), 4, &planes(&off));
+        let notes = notes_of(dir.path(), &hints);
+        let wanted = format!(
+            "{file}, its {what}: 12 % of its texels are outside of 0 to 1 (-0.25 to 1.75) and are clamped"
+        );
+        assert!(notes.contains(&wanted), "{file}: wanted {wanted:?} in {notes:#?}");
+        assert_eq!(notes.iter().filter(|note| note.contains(what)).count(), 1, "{file}: {notes:#?}");
+        exr(&dir.path().join(file), 4, &planes(&rounded));
+        let notes = notes_of(dir.path(), &hints);
+        assert!(!notes.iter().any(|note| note.contains("outside")), "{file}, rounded: {notes:#?}");
+    }
+}
+
+#[test]
+fn directions_of_negative_floats_are_read_as_if_from_0_to_1() {
+    // Along −45°: (0.7, −0.7) is a vector of components, not (0.4, −2.4).
+    let planes = |x: f32, y: f32| vec![("B", vec![1.0; 16]), ("G", vec![y; 16]), ("R", vec![x; 16])];
+    for (file, beside) in
+        [("x_flow.exr", &["x_gloss_u.png", "x_gloss_v.png"][..]), ("x_anisotropy.exr", &["x_roughness.png"])]
+    {
+        let texel = |planes: &[(&str, Vec<f32>)]| {
+            let dir = tempfile::tempdir().unwrap();
+            for (i, file) in beside.iter().enumerate() {
+                write_png(&dir.path().join(file), &grey([0.2, 0.8][i])).unwrap();
+            }
+            exr(&dir.path().join(file), 4, planes);
+            let loaded = scan(dir.path(), &Hints::default()).unwrap().materials[0].load().unwrap();
+            (first_texel(&loaded), loaded.notes)
+        };
+        let (wanted, _) = texel(&planes(0.85, 0.15));
+        let (got, notes) = texel(&planes(0.7, -0.7));
+        for (g, w) in got.iter().zip(wanted) {
+            assert!((g - w).abs() < 1e-5, "{file}: wanted {wanted:?}, got {got:?}");
+        }
+        assert!(wanted[1] < -1e-3, "{file}: {wanted:?} has no direction");
+        assert!(notes.iter().any(|note| note.contains(file) && note.contains("-1 to 1")), "{notes:?}");
+    }
+}
+
+#[test]
+fn red_of_a_coloured_map_is_taken_for_its_number_in_silence() {
+    let flat = image(4, Channels::Rgb, |_, _| [0.5, 0.5, 1.0, 1.0]);
+    // Steps of 8 bits that channels of one texel are apart. JPEG leaves 7 of what was grey within 2.
+    let apart = |steps: f32| {
+        image(32, Channels::Rgb, move |u, v| {
+            let grain = ((u * 32.0) as u32 * 7 + (v * 32.0) as u32 * 13) % 3;
+            let c = |channel: u32| 0.5 + if channel == grain { steps / 255.0 } else { 0.0 };
+            [c(0), c(1), c(2), 1.0]
+        })
+    };
+    let (noise, colour) = (apart(7.0), apart(12.0));
+    let few =
+        image(32, Channels::Rgb, |u, v| if v < 0.03 && u < 0.3 { [1.0, 0.0, 0.0, 1.0] } else { [0.5; 4] });
+    for (file, what) in [
+        ("x_roughness.png", "roughness"),
+        ("x_gloss.png", "gloss"),
+        ("x_ao.png", "occlusion"),
+        ("x_metallic.png", "metalness"),
+    ] {
+        let hints = Hints { roughness: Some(0.5), ..Hints::default() };
+        let notes =
+            |map: &Image| notes_of(painted(&[("x_normal_gl.png", &flat), (file, map)]).path(), &hints);
+        let wanted = format!(
+            "{file}: red, green and blue differ in 100 % of its texels, though a map of {what} is grey; red is taken"
+        );
+        let told = notes(&colour);
+        assert!(told.iter().any(|note| note.starts_with(&wanted)), "wanted {wanted:?} in {told:#?}");
+        for (kind, map) in [("noise", &noise), ("nine texels", &few)] {
+            let told = notes(map);
+            assert!(!told.iter().any(|note| note.contains("red is taken")), "{file}, {kind}: {told:#?}");
+        }
+    }
+    // A packed map is not grey.
+    let told =
+        notes_of(painted(&[("x_normal_gl.png", &flat), ("x_orm.png", &colour)]).path(), &Hints::default());
+    assert!(!told.iter().any(|note| note.contains("red is taken")), "{told:#?}");
+}
+
+#[test]
+fn normals_that_point_below_the_surface_are_turned_or_laid_on_it_in_silence() {
+    let mut map = waves(Green::Up);
+    let plain = notes_of(painted(&[("x_normal_gl.png", &map)]).path(), &Hints::default());
+    assert!(!plain.iter().any(|note| note.contains("below")), "{plain:?}");
+    let Pixels::U16(samples) = &mut map.pixels else { panic!("16 bits") };
+    for texel in samples.chunks_exact_mut(3).step_by(400) {
+        texel[2] = 65535 - texel[2];
+    }
+    for (normal_blue, end) in
+        [(false, "so they are taken as pointing up"), (true, "they are laid on the surface")]
+    {
+        let hints = Hints { normal_blue, ..Hints::default() };
+        let notes = notes_of(painted(&[("x_normal_gl.png", &map)]).path(), &hints);
+        // 4096 texels, each 400th.
+        let begin = "x_normal_gl.png: 11 vectors point below the surface, their blue is under 0.5 (0.27 % of the map)";
+        let told = notes.iter().any(|note| note.starts_with(begin) && note.ends_with(end));
+        assert!(told, "wanted {begin:?} … {end:?} in {notes:#?}");
     }
 }
 

@@ -31,7 +31,7 @@ pub use curvature::{CurvatureArgs, CurvatureReport};
 use curvature::{MethodName, Which};
 pub use folder::bake_folder;
 pub use gltf::bake_gltf;
-pub(crate) use gltf::normal_remarks;
+pub(crate) use gltf::texel_remarks;
 pub use library::{CACHE_LIMIT, LibraryArgs, LibraryReport, bake_library, cache_folder};
 pub(crate) use report::format_name;
 pub use report::{Input, Output, Report, SurfaceReport};

@@ -818,6 +818,46 @@ fn green_down_in_a_model_is_not_noticed_or_not_turned() {
     assert!(said.code == Some(0) && said.out.contains("--y-down"), "{}{}", said.out, said.err);
 }
 
+#[test]
+fn texels_of_a_model_that_cannot_be_are_changed_in_silence() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut map = bumps();
+    let Pixels::U8(samples) = &mut map.pixels else { panic!("8 bits") };
+    for texel in samples.chunks_exact_mut(3).step_by(100) {
+        texel[2] = 100;
+    }
+    let below = folder.path().join("below.glb");
+    std::fs::write(&below, glb_with(&map)).unwrap();
+    let off: Vec<f32> = (0..16).map(|i| if i < 4 { 1.5 } else { 0.5 }).collect();
+    let planes = vec![("B", vec![0.0; 16]), ("G", off), ("R", vec![9.0; 16])];
+    kinran_image::write_exr_planes(&folder.path().join("rough.exr"), (4, 4), planes).unwrap();
+    let rough = changed_model(folder.path(), |document| {
+        document["images"].as_array_mut().unwrap().push(json!({ "uri": "rough.exr" }));
+        let images = document["images"].as_array().unwrap().len();
+        document["textures"].as_array_mut().unwrap().push(json!({ "source": images - 1, "sampler": 0 }));
+        let textures = document["textures"].as_array().unwrap().len();
+        document["materials"][0]["pbrMetallicRoughness"]["metallicRoughnessTexture"] =
+            json!({ "index": textures - 1 });
+    });
+    // 1024 texels, each hundredth.
+    let normal = "\"image 0\": 11 vectors point below the surface, their blue is under 0.5 (1.1 % of the map); they are \
+                  laid on the surface";
+    let number =
+        "its roughness in \"rough\": 25 % of its texels are outside of 0 to 1 (0.50 to 1.50) and are clamped";
+    for (model, wanted) in [(&below, normal), (&rough, number)] {
+        let out = folder.path().join("out");
+        for words in [&["bake", text(model), "-o", text(&out), "--force"][..], &["inspect", text(model)]] {
+            let report = kinran_json(words);
+            let warnings = report["warnings"].as_array().unwrap();
+            let told = warnings.iter().filter(|w| w.as_str().unwrap().contains(wanted)).count();
+            assert_eq!(told, 1, "{words:?}: wanted {wanted:?} once in {warnings:#?}");
+        }
+    }
+    // Red of this texture is nothing.
+    let report = kinran_json(&["inspect", text(&rough)]);
+    assert!(!report["warnings"].to_string().contains("9.00"), "{}", report["warnings"]);
+}
+
 /// Textures of slots that a bake does not touch, geometry that it does not read.
 #[test]
 fn what_a_bake_does_not_need_stops_it() {

@@ -169,6 +169,80 @@ pub fn odd_lengths(image: &Image) -> Option<String> {
     })
 }
 
+/// How far below the surface a vector is not there by rounding: three steps of 8 bits, as JPEG moves samples.
+const BELOW: f64 = 3.0 * 2.0 / 255.0;
+
+/// A sentence's part on the vectors of a normal map that point below the surface, blue under 0.5, which no vector in tangent
+/// space does: how many, and their share. `None` where there is none, and for images without blue.
+pub fn below_surface(image: &Image) -> Option<String> {
+    if image.channels < Channels::Rgb {
+        return None;
+    }
+    let signed = is_signed(image);
+    let below = count(image, |texel| component(texel[2], signed) < -BELOW);
+    (below > 0).then(|| {
+        let (all, are) = (share_of(below, image), if below == 1 { "vector points" } else { "vectors point" });
+        format!("{below} {are} below the surface, their blue is under 0.5 ({all} of the map)")
+    })
+}
+
+/// How far outside of 0 to 1 a number is not there by rounding: half a step of 8 bits.
+const OUTSIDE: f32 = 0.5 / 255.0;
+
+/// A sentence's part on texels of which one of `channels` (0 to 3) is below 0 or above 1, as floats may be: their share and
+/// the numbers found. `None` where there is none.
+pub fn outside_unit(image: &Image, channels: &[usize]) -> Option<String> {
+    if !matches!(image.pixels, Pixels::F32(_)) {
+        return None;
+    }
+    let values = |texel: &[f32; 4]| channels.iter().map(|&c| texel[c]).collect::<Vec<f32>>();
+    let is_outside = |v: &f32| !(-OUTSIDE..=1.0 + OUTSIDE).contains(v);
+    let outside = count(image, |texel| channels.iter().any(|&c| is_outside(&texel[c])));
+    let row_range = |y: u32| {
+        let mut row = Vec::new();
+        image.row_rgba_f32(y, &mut row);
+        let values = row.iter().flat_map(values);
+        values.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
+    };
+    (outside > 0).then(|| {
+        let ranges = (0..image.height).map(row_range);
+        let (least, most) =
+            ranges.fold((f32::INFINITY, f32::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let share = share_of(outside, image);
+        format!("{share} of its texels are outside of 0 to 1 ({least:.2} to {most:.2}) and are clamped")
+    })
+}
+
+/// How far the channels of a texel of a grey map may be apart: JPEG leaves at most 7 steps of 8 bits at any quality of what
+/// was grey within 2, and none of what was grey; of 54 roughness, occlusion and metalness maps none has more than 0.
+const GREY: f32 = 8.0 / 255.0;
+
+/// A sentence's part on a map that is taken for grey and is not: in more than 1 % of its texels red, green and blue are more
+/// than eight steps of 8 bits apart. `None` where it is grey.
+pub fn colored(image: &Image) -> Option<String> {
+    let apart = |[r, g, b, _]: &[f32; 4]| r.max(*g).max(*b) - r.min(*g).min(*b);
+    let colored = count(image, |texel| apart(texel) > GREY + 1e-6);
+    (colored * 100 > image.width as usize * image.height as usize)
+        .then(|| format!("red, green and blue differ in {} of its texels", share_of(colored, image)))
+}
+
+/// How many of all texels `is_one` holds for.
+fn count(image: &Image, is_one: impl Fn(&[f32; 4]) -> bool + Sync) -> usize {
+    let of_row = |y: u32| {
+        let mut row = Vec::new();
+        image.row_rgba_f32(y, &mut row);
+        row.iter().filter(|texel| is_one(texel)).count()
+    };
+    (0..image.height).into_par_iter().map(of_row).sum()
+}
+
+/// So many of an image's texels in percent, with two digits that count.
+fn share_of(texels: usize, image: &Image) -> String {
+    let percent = 100.0 * texels as f64 / (f64::from(image.width) * f64::from(image.height));
+    let digits = (1.0 - percent.log10().floor()).clamp(0.0, 6.0) as usize;
+    format!("{percent:.digits$} %")
+}
+
 /// Texels along the side of the squares whose means are compared: JPEG that halves colour leaves them, and little of single
 /// texels of normal maps.
 const SQUARE: usize = 8;
@@ -289,7 +363,8 @@ pub(super) fn is_grey(image: &Image) -> bool {
     rows.iter().sum::<usize>() * 100 <= rows.len() * image.width as usize
 }
 
-fn is_signed(image: &Image) -> bool {
+/// Whether an image holds numbers below 0, as floats may: its components are from −1 to 1.
+pub(super) fn is_signed(image: &Image) -> bool {
     matches!(&image.pixels, Pixels::F32(data) if data.iter().any(|v| *v < 0.0))
 }
 

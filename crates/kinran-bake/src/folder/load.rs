@@ -9,7 +9,10 @@ use kinran_scene::Wrap;
 use kinran_shading::{alpha_from_roughness, alphas_from_khr_anisotropy};
 use rayon::prelude::*;
 
-use super::evidence::{green_correlation, guess_by_correlation, is_grey, not_normals, odd_lengths};
+use super::evidence::{
+    below_surface, colored, green_correlation, guess_by_correlation, is_grey, is_signed, not_normals,
+    odd_lengths, outside_unit,
+};
 use super::{
     BaseRoughness, DirectionSource, FolderError, Green, GreenGuess, GreenSource, LevelSource, MapChannel,
     MaterialMaps, NormalSource, Role, RoughnessSource,
@@ -84,6 +87,8 @@ impl MaterialMaps {
             channel(&images, map)?;
         }
 
+        notes.extend(self.doubtful_numbers(&images));
+
         let surface = match &self.roughness {
             None => None,
             Some(source) => {
@@ -126,6 +131,89 @@ impl MaterialMaps {
             image.transfer = space;
         }
         Ok(image)
+    }
+
+    /// What the texels of maps of numbers say against them: numbers that no such map holds, and colour where grey is wanted.
+    fn doubtful_numbers(&self, images: &Images) -> Vec<String> {
+        let mut notes = Vec::new();
+        for (what, map) in self.numbers() {
+            let file = super::file_name(&map.file);
+            let outside = outside_unit(&images[&map.file], &[map.channel]);
+            notes.extend(outside.map(|outside| format!("{file}, its {what}: {outside}")));
+            let is_alone = self.files.iter().any(|(role, path)| *path == map.file && !role.is_packed());
+            if let Some(colored) = colored(&images[&map.file]).filter(|_| is_alone && map.channel == 0) {
+                notes.push(format!(
+                    "{file}: {colored}, though a map of {what} is grey; red is taken, name it with --map ROLE={file} if it \
+                     holds something else"
+                ));
+            }
+        }
+        if let Some(file) = self.vectors().filter(|file| is_signed(&images[*file])) {
+            notes.push(format!(
+                "{}: it holds negative numbers, so red and green are taken as -1 to 1, not as 0 to 1",
+                super::file_name(file)
+            ));
+        }
+        let wholes = [(&self.color, "colour", 4), (&self.encoded(), "aniso texels", 3)];
+        for (file, what, channels) in wholes {
+            let Some(file) = file else { continue };
+            let outside = outside_unit(&images[file], &[0, 1, 2, 3][..channels]);
+            notes.extend(outside.map(|outside| format!("{}, its {what}: {outside}", super::file_name(file))));
+        }
+        notes
+    }
+
+    fn encoded(&self) -> Option<PathBuf> {
+        match &self.roughness {
+            Some(RoughnessSource::Encoded(file)) => Some(file.clone()),
+            _ => None,
+        }
+    }
+
+    /// The maps of numbers from 0 to 1, each with its name.
+    fn numbers(&self) -> Vec<(&'static str, MapChannel)> {
+        let red = |file: &PathBuf| MapChannel { file: file.clone(), channel: 0 };
+        let mut numbers = Vec::new();
+        numbers.extend(self.occlusion.clone().map(|map| ("occlusion", map)));
+        numbers.extend(self.metallic.clone().map(|map| ("metalness", map)));
+        let (base, direction) = match &self.roughness {
+            None | Some(RoughnessSource::Encoded(_)) => (None, None),
+            Some(RoughnessSource::Isotropic(base)) => (Some(base), None),
+            Some(RoughnessSource::GlossUv { u, v, direction }) => {
+                numbers.extend([("gloss along", red(u)), ("gloss across", red(v))]);
+                (None, direction.as_ref())
+            }
+            Some(RoughnessSource::Level { base, level, direction }) => {
+                if let LevelSource::Adobe(file) = level {
+                    numbers.push(("anisotropy level", red(file)));
+                }
+                (Some(base), direction.as_ref())
+            }
+            Some(RoughnessSource::Khr { base, texture }) => {
+                numbers.push(("anisotropy strength", MapChannel { file: texture.clone(), channel: 2 }));
+                (Some(base), None)
+            }
+        };
+        match base {
+            Some(BaseRoughness::Roughness(map)) => numbers.push(("roughness", map.clone())),
+            Some(BaseRoughness::Gloss(map)) => numbers.push(("gloss", map.clone())),
+            Some(BaseRoughness::Constant(_)) | None => {}
+        }
+        let angle = direction.filter(|direction| direction.angle);
+        numbers.extend(angle.map(|direction| ("angle", red(&direction.file))));
+        numbers
+    }
+
+    /// The map whose red and green are a direction.
+    fn vectors(&self) -> Option<&PathBuf> {
+        match &self.roughness {
+            Some(
+                RoughnessSource::GlossUv { direction: Some(direction), .. }
+                | RoughnessSource::Level { direction: Some(direction), .. },
+            ) if !direction.angle => Some(&direction.file),
+            Some(RoughnessSource::Khr { texture, .. }) => Some(texture),
+            _ => None,
+        }
     }
 
     fn loaded(&self, role: Role, path: &Path, image: Arc<Image>) -> LoadedMap {
@@ -208,6 +296,14 @@ fn normal_map(
             NormalZ::Blue => format!("{name}: {lengths}; red, green and blue are brought to it together"),
         });
     }
+    if let Some(below) = below_surface(image) {
+        notes.push(match source.z {
+            NormalZ::Rebuilt => {
+                format!("{name}: {below}; z is rebuilt from red and green, so they are taken as pointing up")
+            }
+            NormalZ::Blue => format!("{name}: {below}; they are laid on the surface"),
+        });
+    }
     Ok(NormalMap { z: source.z, ..NormalMap::new(image.clone(), source.green == Green::Down) })
 }
 
@@ -278,7 +374,7 @@ fn roughness_maps(
             RoughnessMaps::Gloss { u, v, direction: direction_map(direction.as_ref(), images)? }
         }
         RoughnessSource::Khr { base, texture } => {
-            let image = &images[texture];
+            let image = &unsigned(&images[texture]);
             if is_grey(image) {
                 return Err(unfit(
                     texture,
@@ -345,8 +441,24 @@ fn direction_map(
                 ),
             ));
         }
-        (false, _) => DirectionMap::Vector(image.clone()),
+        (false, _) => DirectionMap::Vector(unsigned(image)),
     }))
+}
+
+/// A map of directions with red and green from 0 to 1, as they are in all but floats that hold negative numbers.
+fn unsigned(image: &Arc<Image>) -> Arc<Image> {
+    let mut image = image.clone();
+    if is_signed(&image) {
+        let own = Arc::make_mut(&mut image);
+        let count = own.channels.count();
+        if let Pixels::F32(samples) = &mut own.pixels {
+            samples
+                .chunks_exact_mut(count)
+                .flat_map(|texel| &mut texel[..2])
+                .for_each(|v| *v = *v * 0.5 + 0.5);
+        }
+    }
+    image
 }
 
 /// Principal alphas of the Adobe Standard Material, `alpha_b = roughness²`, `alpha_t = min(1, alpha_b +

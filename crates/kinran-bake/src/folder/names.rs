@@ -363,26 +363,11 @@ const WORDS: [(Role, &[&str]); 25] = [
             "position",
             "id",
             "translucency",
-            "transmission",
-            "transmissioncolor",
             "sss",
-            "subsurface",
-            "subsurfacecolor",
-            "subsurfaceradius",
             "ior",
             "specularior",
             "specularrotation",
             "diffuseroughness",
-            "coat",
-            "coatcolor",
-            "coatnormal",
-            "coatroughness",
-            "clearcoat",
-            "clearcoatnormal",
-            "clearcoatroughness",
-            "sheen",
-            "sheencolor",
-            "sheenroughness",
             "worldspacenormal",
             "worldspacenormals",
             "worldnormal",
@@ -401,6 +386,37 @@ const WORDS: [(Role, &[&str]); 25] = [
     ),
 ];
 
+/// Layers beside the base, whose maps are none of the base's: Standard Surface, OpenPBR, Substance, glTF.
+const LAYERS: [&str; 8] =
+    ["coat", "clearcoat", "sheen", "fuzz", "subsurface", "transmission", "iridescence", "thinfilm"];
+
+/// What stands behind a layer besides names of normal, roughness, gloss, anisotropy and opacity maps.
+const OF_LAYERS: [&str; 11] = [
+    "color",
+    "colour",
+    "tint",
+    "weight",
+    "factor",
+    "intensity",
+    "level",
+    "ior",
+    "rotation",
+    "radius",
+    "thickness",
+];
+
+/// Whether a word names a layer, or a map of one.
+fn is_of_layer(word: &str) -> bool {
+    use Role::{Anisotropy, AnisotropyLevel, DirectionAngle, Gloss, Normal, Opacity, Roughness};
+    let maps = [Normal, Roughness, Gloss, Anisotropy, AnisotropyLevel, DirectionAngle, Opacity];
+    let is_map = |what: &str| {
+        what.is_empty()
+            || OF_LAYERS.contains(&what)
+            || role_of_word(what).is_some_and(|(role, _)| maps.contains(&role))
+    };
+    LAYERS.iter().any(|layer| word.strip_prefix(layer).is_some_and(is_map))
+}
+
 fn role_of_word(word: &str) -> Option<(Role, Option<Green>)> {
     for base in NORMAL_WORDS {
         match word.strip_prefix(base) {
@@ -410,7 +426,8 @@ fn role_of_word(word: &str) -> Option<(Role, Option<Green>)> {
             _ => {}
         }
     }
-    WORDS.iter().find(|(_, words)| words.contains(&word)).map(|(role, _)| (*role, None))
+    let named = WORDS.iter().find(|(_, words)| words.contains(&word)).map(|(role, _)| (*role, None));
+    named.or_else(|| is_of_layer(word).then_some((Role::Other, None)))
 }
 
 /// The role of Unreal's one and two letters; `a` and `b` are a colour only where the name begins as Unreal's do.
@@ -528,9 +545,11 @@ pub(super) fn readings(name: &str) -> Vec<Name> {
             ..nothing.clone()
         };
         let mut whole = reading(begin, role, green, letter);
-        // "x_rough_ao" holds both, or is the occlusion of a material called "x_rough"; so with "x_specular_roughness".
+        // "x_rough_ao" holds both, or is the occlusion of a material called "x_rough"; so with "x_specular_roughness" and
+        // "x_coat_roughness".
         let last = (begin + 1 < end && !all[end - 1].camel).then(|| role_of(&lower[end - 1])).flatten();
-        if let Some((last, green)) = last.filter(|_| role.is_packed() || role == Role::Roughness) {
+        let may_be_two = role.is_packed() || matches!(role, Role::Roughness | Role::Other);
+        if let Some((last, green)) = last.filter(|_| may_be_two) {
             whole.joined = true;
             found.push(whole);
             found.push(reading(end - 1, last, green, false));
@@ -565,11 +584,6 @@ fn role_at(
         let camel_unsafe = word.len() <= 3 && !shouted || matches!(word.as_str(), "metal" | "mask");
         let lonely = begin + 1 == end;
         if all[begin].camel && lonely && camel_unsafe {
-            return None;
-        }
-        // "Metallic_Roughness" is the roughness of a material called Metallic, "x_metallic_roughness" is not.
-        let crosses = all[begin + 1..end].iter().any(|p| !p.camel);
-        if (role.is_packed() || role == Role::Other) && begin == 0 && crosses {
             return None;
         }
         Some((begin, role, green, false))
@@ -714,7 +728,15 @@ mod tests {
             ("Wood-Floor-Normal-1024x1024", "Wood-Floor", Normal, None),
             ("WoodNormalMap", "Wood", Normal, None),
             ("WoodAO", "Wood", Occlusion, None),
-            ("Metallic_Roughness", "Metallic", Roughness, None),
+            ("metallic_roughness", "", MetallicRoughness, None),
+            ("Bent_Normal", "", Other, None),
+            ("rock_clearcoat_roughness", "rock", Other, None),
+            ("rockClearcoatNormal", "rock", Other, None),
+            ("rock_sheen_roughness", "rock", Other, None),
+            ("rock_Coat_anisotropy_level", "rock", Other, None),
+            ("rock_thin_film_thickness", "rock", Other, None),
+            ("coat_base_color", "coat", Color, None),
+            ("coat_ao", "coat", Occlusion, None),
             ("Fabric_ARM", "Fabric", Orm, None),
         ];
         for (name, stem, role, green) in cases {
@@ -753,6 +775,9 @@ mod tests {
         };
         assert_eq!(line("- +Y"), UP_WORDS);
         assert_eq!(line("- −Y"), DOWN_WORDS);
+        let layers = line("- Layers");
+        let (before, behind) = layers.split_at(LAYERS.len());
+        assert_eq!((before, behind), (&LAYERS.map(String::from)[..], &OF_LAYERS.map(String::from)[..]));
         for letters in line("- Letters").chunks(2) {
             let [letter, role] = letters else { panic!("{letters:?}: a letter without its role") };
             assert_eq!(role_of_letter(letter, true).map(Role::name), Some(role.as_str()), "{letter}");

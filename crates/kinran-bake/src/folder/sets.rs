@@ -20,7 +20,11 @@ pub(super) fn settle(found: &mut [Found]) {
         let first = &file.readings[0];
         let chosen = match first.role {
             None => file.readings[1..].iter().find(|name| sets.accepts_unknown(name)),
-            Some(_) if first.joined => file.readings.get(1).filter(|name| sets.has_whole(&name.stem, i)),
+            Some(_) if first.joined => {
+                let is_named =
+                    |name: &&Name| sets.has_whole(&name.stem, i) || sets.is_set_of_layers(name, first);
+                file.readings.get(1).filter(is_named)
+            }
             Some(_) => file.readings[1..].iter().find(|name| sets.accepts_role(name, &first.stem)),
         };
         if let Some(chosen) = chosen.cloned() {
@@ -44,6 +48,43 @@ pub(super) fn settle(found: &mut [Found]) {
             file.note = format!(
                 "{tail} behind the {role} is not understood; --map {role}={file_name} takes it for one"
             );
+        } else if first.role == Some(Role::Other)
+            && let Some(role) = file.readings.get(1).filter(|_| first.joined).and_then(|name| name.role)
+            && role.is_used()
+        {
+            let file_name = &file.file;
+            file.dropped =
+                Some(format!("by its name no {role} of the base; --map {role}={file_name} takes it for one"));
+        }
+    }
+}
+
+/// Gives maps without words behind their role to the variants of their material, where there are several and none has such
+/// a map: Poliigon's two workflows have one occlusion.
+pub(super) fn share(found: &mut [Found]) {
+    // Variants by the material's name in lower case: their names, and their roles together.
+    let mut variants: BTreeMap<String, (BTreeSet<String>, BTreeSet<Role>)> = BTreeMap::new();
+    let is_map = |file: &Found| file.dropped.is_none() && file.role.is_some_and(Role::is_used);
+    for file in found.iter().filter(|file| is_map(file) && !is_tile(&file.name.tail)) {
+        let ending = format!("_{}", file.name.tail);
+        let Some(stem) = file.name.stem.strip_suffix(&ending).filter(|_| !file.name.tail.is_empty()) else {
+            continue;
+        };
+        let (names, roles) = variants.entry(stem.to_lowercase()).or_default();
+        if !names.iter().any(|name| name.eq_ignore_ascii_case(&file.name.stem)) {
+            names.insert(file.name.stem.clone());
+        }
+        roles.extend(file.role);
+    }
+    for (stem, (names, roles)) in variants.into_iter().filter(|(_, (names, _))| names.len() > 1) {
+        let is_of_it = |file: &Found| is_map(file) && file.name.stem.to_lowercase() == stem;
+        if found.iter().any(|file| is_of_it(file) && file.role.is_some_and(|role| roles.contains(&role))) {
+            continue;
+        }
+        let list: Vec<String> = names.into_iter().collect();
+        for file in found.iter_mut().filter(|file| is_of_it(file)) {
+            add_note(&mut file.note, &format!("shared by {}", list.join(" and ")));
+            file.shared_by.clone_from(&list);
         }
     }
 }
@@ -79,14 +120,26 @@ struct Sets {
     whole: Vec<Option<(String, Role)>>,
     /// Tails by stem, those of each file; empty ones too.
     tails: BTreeMap<String, Vec<String>>,
+    /// Roles of names such as `x_coat_roughness`, by the stem that they have where a material is called `x_coat`.
+    of_layers: BTreeMap<String, BTreeSet<Role>>,
 }
 
 impl Sets {
     fn of(found: &[Found]) -> Self {
-        let mut sets = Sets { roles: BTreeMap::new(), whole: Vec::new(), tails: BTreeMap::new() };
+        let mut sets = Sets {
+            roles: BTreeMap::new(),
+            whole: Vec::new(),
+            tails: BTreeMap::new(),
+            of_layers: BTreeMap::new(),
+        };
         for file in found {
             let first = &file.readings[0];
             sets.whole.push(first.role.map(|role| (first.stem.to_lowercase(), role)));
+            if let Some(second) =
+                file.readings.get(1).filter(|_| first.joined && first.role == Some(Role::Other))
+            {
+                sets.of_layers.entry(second.stem.to_lowercase()).or_default().extend(second.role);
+            }
             let mut of_file: BTreeMap<String, String> = BTreeMap::new();
             for name in file.readings.iter().filter(|name| !(name.joined && file.readings.len() > 1)) {
                 let Some(role) = name.role else { continue };
@@ -110,6 +163,14 @@ impl Sets {
         let stem = stem.to_lowercase();
         let is_it = |whole: &Option<(String, Role)>| whole.as_ref().is_some_and(|(other, _)| *other == stem);
         self.whole.iter().enumerate().any(|(i, whole)| i != but && is_it(whole))
+    }
+
+    /// Whether maps that may be a layer's are a material's: a set of them, beside nothing that they could be a layer of.
+    fn is_set_of_layers(&self, name: &Name, first: &Name) -> bool {
+        let base = first.stem.to_lowercase();
+        let of_base = |(stem, role): &(String, Role)| *stem == base && *role != Role::Other;
+        self.of_layers.get(&name.stem.to_lowercase()).is_some_and(|roles| roles.len() >= SET_OF_A_ROLE)
+            && !self.whole.iter().flatten().any(of_base)
     }
 
     fn has_tiles(&self, stem: &str) -> bool {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use kinran_bake::aniso::{RoughnessMaps, Sheet, SheetRequest, bake_surface};
-use kinran_bake::folder::{Green, GreenGuess, guess_green, odd_lengths};
+use kinran_bake::folder::{Green, GreenGuess, below_surface, guess_green, odd_lengths, outside_unit};
 use kinran_bake::{MaterialSurface, NoSurface, bake_plain, material_surface};
 use kinran_image::{
     Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Role, Texture, Transfer, decode_image,
@@ -401,17 +401,17 @@ fn surfaces(
     let mut apart = false;
     // A document without materials has one in the scene that it cannot name.
     for material in 0..document.material_count().min(scene.materials.len()) {
-        match material_surface(scene, material) {
+        let surface = material_surface(scene, material);
+        if !matches!(surface, Err(NoSurface::Apart(_))) {
+            let name = |image| document.image_name(image);
+            report.warnings.extend(texel_remarks(scene, material, &name, args.green()));
+        }
+        match surface {
             // Factors alone need no texture.
             Ok(surface) if surface.place.is_none() => {}
             Ok(mut surface) => {
                 let key = Key::new(scene, material);
                 surface.maps.normal.y_down = args.y_down;
-                report.warnings.extend(normal_remarks(
-                    &scene.materials[material].name,
-                    &surface,
-                    args.green(),
-                ));
                 match surfaces.iter_mut().find(|(known, ..)| *known == key) {
                     Some((_, materials, _)) => materials.push(material),
                     None => surfaces.push((key, vec![material], surface)),
@@ -434,9 +434,40 @@ fn surfaces(
     surfaces
 }
 
-/// What the texels of a material's normal map say against it.
-pub(crate) fn normal_remarks(material: &str, surface: &MaterialSurface, said: Option<Green>) -> Vec<String> {
-    let Some(image) = &surface.maps.normal.image else { return Vec::new() };
+/// What the texels of a material's maps say against them, a sentence each; `name` gives images' names.
+pub(crate) fn texel_remarks(
+    scene: &Scene,
+    material: usize,
+    name: &dyn Fn(usize) -> String,
+    said: Option<Green>,
+) -> Vec<String> {
+    let m = &scene.materials[material];
+    let image = |place: Option<&TextureRef>| -> Option<(String, &Image)> {
+        let place = place?;
+        Some((name(place.image), scene.images.get(place.image)?.as_deref()?))
+    };
+    let mut remarks = Vec::new();
+    if let Some((name, normal)) = image(m.normal.as_ref()) {
+        remarks.extend(normal_remarks(&name, normal, said));
+    }
+    let anisotropy = m.anisotropy.as_ref().and_then(|a| a.texture.as_ref());
+    let numbers: [(&str, Option<&TextureRef>, &[usize]); 6] = [
+        ("roughness", m.metallic_roughness.as_ref(), &[1]),
+        ("metalness", m.metallic_roughness.as_ref(), &[2]),
+        ("anisotropy", anisotropy, &[0, 1, 2]),
+        ("occlusion", m.occlusion.as_ref(), &[0]),
+        ("base colour", m.base_color.as_ref(), &[0, 1, 2]),
+        ("opacity", m.base_color.as_ref(), &[3]),
+    ];
+    for (what, place, channels) in numbers {
+        let outside = image(place).and_then(|(name, image)| Some((name, outside_unit(image, channels)?)));
+        remarks.extend(outside.map(|(name, outside)| format!("its {what} in \"{name}\": {outside}")));
+    }
+    remarks.into_iter().map(|remark| format!("material \"{}\": {remark}", m.name)).collect()
+}
+
+/// What the texels of a normal map say against it.
+fn normal_remarks(name: &str, image: &Image, said: Option<Green>) -> Vec<String> {
     let guess = guess_green(image);
     let green = match (guess, said) {
         (GreenGuess::Down, None) => Some(
@@ -454,8 +485,9 @@ pub(crate) fn normal_remarks(material: &str, surface: &MaterialSurface, said: Op
     let lengths = odd_lengths(image).map(|lengths| {
         format!("its normal map: {lengths}; red, green and blue are brought to it together, as in glTF")
     });
-    let remarks = green.map(str::to_owned).into_iter().chain(lengths);
-    remarks.map(|remark| format!("material \"{material}\": {remark}")).collect()
+    let below = below_surface(image)
+        .map(|below| format!("its normal map \"{name}\": {below}; they are laid on the surface"));
+    green.map(str::to_owned).into_iter().chain(lengths).chain(below).collect()
 }
 
 /// What makes two materials' surfaces the same.

@@ -9,7 +9,7 @@ use kinran_scene::{Document, LightKind, Material, Needs, Scene, TextureRef};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::bake::{format_name, normal_remarks};
+use crate::bake::{format_name, texel_remarks};
 use crate::model::{ModelArgs, read_scene};
 use crate::render::triangles;
 use crate::table::list;
@@ -105,10 +105,8 @@ pub(super) fn inspect(path: &Path, args: &ModelArgs, console: &Console) -> Resul
         bake: bake(&scene, i),
         ignored_extensions: m.ignored_extensions.clone(),
     });
-    let remarks = scene.materials.iter().enumerate().flat_map(|(i, m)| match material_surface(&scene, i) {
-        Ok(surface) => normal_remarks(&m.name, &surface, None),
-        Err(_) => Vec::new(),
-    });
+    let image = |i: usize| document.as_ref().map_or_else(|| i.to_string(), |document| document.image_name(i));
+    let remarks = (0..scene.materials.len()).flat_map(|i| texel_remarks(&scene, i, &image, None));
     let cameras = scene.cameras.iter().map(|camera| CameraReport {
         position: camera.transform.translation.to_array(),
         yfov_degrees: camera.yfov.to_degrees(),
