@@ -12,6 +12,11 @@
 //! parabola, by `k³ x⁴ / 8`: the term `g z²` knows that, with the g of a sphere or cylinder that bends as the fit does;
 //! these are fitted exactly. And a neighbour counts by the curvature that its height says, `2 z / r²`, so that the far
 //! ones, of which there are more, do not say it all.
+//!
+//! On scans that is too near: the noise of the point itself and of its nearest neighbours is most of what they say. What a
+//! fit leaves over tells, by the usual propagation of errors, how uncertain its second derivatives are. Noise makes them
+//! half as uncertain over three rings, shape that the fit does not follow makes them more so. Where it is noise, the point
+//! is fitted over three rings with a height of its own and all neighbours alike, unless that contradicts the nearer fit.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -24,6 +29,9 @@ use rayon::prelude::*;
 /// Coefficients with and without cubic terms.
 const CUBIC: usize = 9;
 const QUADRATIC: usize = 5;
+
+/// Cubic terms and the point's own height.
+const FREE: usize = 10;
 
 /// Neighbours that a cubic fit wants: half as many again as coefficients.
 const ENOUGH: usize = 14;
@@ -41,6 +49,14 @@ const NEAREST: f64 = 0.01;
 /// Cosine to the normal from triangles, below which a fitted normal is that of no surface but of a crease: 18°, several
 /// times what they differ by on the coarsest of smooth meshes. Chosen by eye.
 const SAME_NORMAL: f32 = 0.95;
+
+/// Standard deviation of second derivatives, over the curvature, below which a fit needs no second look; and how much of it
+/// may be left over three rings, where noise leaves 0.44 to 0.55 and coarse meshes 1.3 to 1.8. Between these, chosen by eye.
+const CERTAIN: f64 = 0.01;
+const LESS_UNCERTAIN: f64 = 0.6;
+
+/// Standard deviations of the nearer fit by which a smooth one may differ from it.
+const CONTRADICTS: f64 = 3.0;
 
 /// Points of one piece of work.
 const BAND: usize = 4096;
@@ -114,41 +130,82 @@ impl<T, F: Fn(Graph, usize) -> T> pulp::WithSimd for FitBand<'_, T, F> {
     type Output = usize;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> usize {
+    fn with_simd<S: pulp::Simd>(mut self, _: S) -> usize {
         let mut unfitted = 0;
         let mut group =
             Group { local: [[[0.0; LANES]; 3]; NEIGHBOURS_MAX], counts: [0; LANES], inverse: [0.0; LANES] };
-        for (i, results) in self.results.chunks_mut(LANES).enumerate() {
-            let first = self.first + i * LANES;
-            group.counts = [0; LANES];
-            for l in 0..results.len() {
-                let point = first + l;
-                if self.normals[point] != Vec3::ZERO {
-                    self.rings.collect(self.surface, self.fans, point);
-                    group.place(l, self.surface, self.normals, &self.rings.points);
+        for i in 0..self.results.len().div_ceil(LANES) {
+            let (first, len) = (self.first + i * LANES, LANES.min(self.results.len() - i * LANES));
+            let has_normal = std::array::from_fn(|l| l < len && self.normals[first + l] != Vec3::ZERO);
+            self.gather(&mut group, first, has_normal, 2);
+            let cubic = solve::<CUBIC>(&group);
+            let mut graphs = [const { None::<Graph> }; LANES];
+            let is_cubic: [bool; LANES] =
+                std::array::from_fn(|l| cubic.solved[l] && group.counts[l] >= ENOUGH);
+            for l in (0..len).filter(|&l| is_cubic[l]) {
+                graphs[l] = Some(Graph::new(&cubic, l, group.inverse[l]));
+            }
+            if is_cubic[..len].contains(&false) {
+                let quadratic = solve::<QUADRATIC>(&group);
+                for l in (0..len).filter(|&l| !is_cubic[l]) {
+                    let fits = quadratic.solved[l] && group.counts[l] >= QUADRATIC;
+                    graphs[l] = fits.then(|| Graph::new(&quadratic, l, group.inverse[l]));
                 }
             }
-            let neighbours = group.pad();
-            let (cubic, solved) = solve::<CUBIC>(&group.local[..neighbours]);
-            let mut missed = [false; LANES];
-            for (l, result) in results.iter_mut().enumerate() {
-                missed[l] = !solved[l] || group.counts[l] < ENOUGH;
-                if !missed[l] {
-                    *result = (self.of)(Graph::new(&cubic, l, group.inverse[l]), first + l);
-                }
+            let near = doubt(&group, &cubic);
+            let is_doubtful: [bool; LANES] = std::array::from_fn(|l| {
+                is_cubic[l] && graphs[l].as_ref().is_some_and(|graph| near[l] > CERTAIN * graph.size())
+            });
+            if is_doubtful.contains(&true) {
+                self.smooth(&mut group, first, is_doubtful, near, &mut graphs);
             }
-            if missed.contains(&true) {
-                let (quadratic, solved) = solve::<QUADRATIC>(&group.local[..neighbours]);
-                for (l, result) in results.iter_mut().enumerate().filter(|(l, _)| missed[*l]) {
-                    if solved[l] && group.counts[l] >= QUADRATIC {
-                        *result = (self.of)(Graph::new(&quadratic, l, group.inverse[l]), first + l);
-                    } else {
-                        unfitted += 1;
-                    }
+            for (l, graph) in graphs.into_iter().take(len).enumerate() {
+                match graph {
+                    Some(graph) => self.results[i * LANES + l] = (self.of)(graph, first + l),
+                    None => unfitted += 1,
                 }
             }
         }
         unfitted
+    }
+}
+
+impl<T, F: Fn(Graph, usize) -> T> FitBand<'_, T, F> {
+    /// Puts the neighbours of the points from `first` on into their lanes, where they are `wanted`: at least so many rings.
+    #[inline(always)]
+    fn gather(&mut self, group: &mut Group, first: usize, wanted: [bool; LANES], rings: usize) {
+        group.counts = [0; LANES];
+        for l in (0..LANES).filter(|&l| wanted[l]) {
+            self.rings.collect(self.surface, self.fans, first + l, rings);
+            group.place(l, self.surface, self.normals, &self.rings.points);
+        }
+        group.pad();
+    }
+
+    /// Replaces graphs of which noise is what is uncertain, by `near`, by smooth ones.
+    #[inline(always)]
+    fn smooth(
+        &mut self,
+        group: &mut Group,
+        first: usize,
+        wanted: [bool; LANES],
+        near: Lanes,
+        graphs: &mut [Option<Graph>; LANES],
+    ) {
+        self.gather(group, first, wanted, 3);
+        let cubic = solve::<CUBIC>(group);
+        let far = doubt(group, &cubic);
+        let free = solve::<FREE>(group);
+        for l in (0..LANES).filter(|&l| wanted[l] && cubic.solved[l] && free.solved[l]) {
+            let smooth = Graph::new(&free, l, group.inverse[l]);
+            let apart = graphs[l].as_ref().map_or(f64::INFINITY, |graph| {
+                let pairs = graph.second.iter().zip(smooth.second);
+                pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+            });
+            if far[l] < LESS_UNCERTAIN * near[l] && apart < CONTRADICTS * near[l] {
+                graphs[l] = Some(smooth);
+            }
+        }
     }
 }
 
@@ -160,8 +217,8 @@ struct Rings {
 }
 
 impl Rings {
-    /// Collects rings until there are enough neighbours; the point itself comes first.
-    fn collect(&mut self, surface: &Welded, fans: &Fans, point: usize) {
+    /// Collects at least so many rings, until there are enough neighbours; the point itself comes first.
+    fn collect(&mut self, surface: &Welded, fans: &Fans, point: usize, least: usize) {
         let mark = point as u32;
         self.points.clear();
         self.points.push(mark);
@@ -181,7 +238,7 @@ impl Rings {
                     }
                 }
             }
-            if self.points.len() == to || (ring >= 1 && self.points.len() > ENOUGH) {
+            if self.points.len() == to || (ring + 1 >= least && self.points.len() > ENOUGH) {
                 break;
             }
             from = to;
@@ -223,11 +280,16 @@ impl Group {
         self.inverse[l] = if farthest > 0.0 { farthest.sqrt().recip() } else { 0.0 };
     }
 
-    /// Scales what was placed, and fills lanes with zeros, which change no sum, up to the longest; its number of
-    /// neighbours.
+    /// The neighbours, of each lane as many as of the longest.
     #[inline(always)]
-    fn pad(&mut self) -> usize {
-        let longest = self.counts.iter().copied().max().unwrap_or(0);
+    fn neighbours(&self) -> &[[Lanes; 3]] {
+        &self.local[..self.counts.iter().copied().max().unwrap_or(0)]
+    }
+
+    /// Scales what was placed, and fills lanes with zeros, which change no sum, up to the longest.
+    #[inline(always)]
+    fn pad(&mut self) {
+        let longest = self.neighbours().len();
         for (i, place) in self.local[..longest].iter_mut().enumerate() {
             for axis in place {
                 for (l, x) in axis.iter_mut().enumerate() {
@@ -235,7 +297,6 @@ impl Group {
                 }
             }
         }
-        longest
     }
 }
 
@@ -249,19 +310,16 @@ struct Graph {
 
 impl Graph {
     /// From what [`solve`] gives for a lane whose neighbours were scaled by `inverse`.
-    fn new<const N: usize>([height, square]: &[[Lanes; N]; 2], l: usize, inverse: f64) -> Self {
-        // The coefficients are linear in g, and g follows from them: k where the surface bends to one side only, as a
-        // sphere (both curvatures k) or a cylinder (k and 0), and less the more it is a saddle, whose height knows no z².
-        let mut c = [0, 1, 2, 3, 4].map(|i| height[i][l]);
-        for _ in 0..4 {
-            let (mean, half) = (0.5 * (c[2] + c[4]), 0.5 * (c[2] - c[4]));
-            let apart = (half * half + c[3] * c[3]).sqrt();
-            let length = (mean * mean + apart * apart).sqrt().max(f64::MIN_POSITIVE);
-            let share = (std::f64::consts::SQRT_2 * mean / length).clamp(-1.0, 1.0);
-            let g = mean + share * apart;
-            c = [0, 1, 2, 3, 4].map(|i| height[i][l] - g * square[i][l]);
-        }
+    fn new<const N: usize>(fit: &Fit<N>, l: usize, inverse: f64) -> Self {
+        let g = fit.bend(l);
+        let c = [0, 1, 2, 3, 4].map(|i| fit.height[i][l] - g * fit.square[i][l]);
         Graph { slopes: [c[0], c[1]], second: [c[2], c[3], c[4]].map(|c| c * inverse) }
+    }
+
+    /// Root of the sum of squares of all second derivatives.
+    fn size(&self) -> f64 {
+        let [xx, xy, yy] = self.second;
+        (xx * xx + 2.0 * xy * xy + yy * yy).sqrt()
     }
 
     /// The unit normal, where the graph stands over the plane of the unit normal `n`.
@@ -317,26 +375,109 @@ fn multiply(to: &mut Lanes, a: Lanes) {
     }
 }
 
-/// Least squares of `z` and of `z²/2` on `x, y, x²/2, xy, y²/2` and, with nine coefficients, the cubic monomials, each
-/// neighbour over its squared distance: normal equations by Cholesky, in every lane. Also whether the neighbours
-/// determine them.
-#[inline(always)]
-fn solve<const N: usize>(neighbours: &[[Lanes; 3]]) -> ([[Lanes; N]; 2], [bool; LANES]) {
-    let mut matrix = [[[0.0f64; LANES]; N]; N];
-    let mut rights = [[[0.0f64; LANES]; N]; 2];
-    for [x, y, z] in neighbours {
-        let mut all = [[0.0f64; LANES]; CUBIC];
-        let mut goals = [[0.0f64; LANES]; 2];
-        for l in 0..LANES {
-            let (x, y, z) = (x[l], y[l], z[l]);
-            let (x2, xy, y2) = (x * x, x * y, y * y);
-            let w = 1.0 / (x2 + y2 + z * z + NEAREST);
-            let monomials = [x, y, 0.5 * x2, xy, 0.5 * y2, x2 * x, x2 * y, x * y2, y2 * y];
-            for (all, monomial) in all.iter_mut().zip(monomials) {
-                all[l] = w * monomial;
-            }
-            (goals[0][l], goals[1][l]) = (w * z, 0.5 * w * z * z);
+/// Coefficients in every lane.
+struct Fit<const N: usize> {
+    /// Of `z`, and of `z²/2`.
+    height: [Lanes; N],
+    square: [Lanes; N],
+    /// Rows of the normal equations' inverse, of the second derivatives xx, xy, yy.
+    inverse: [[Lanes; N]; 3],
+    /// Whether the neighbours determine them.
+    solved: [bool; LANES],
+}
+
+impl<const N: usize> Fit<N> {
+    /// The g of `g z²`. The coefficients are linear in it, and it follows from them: k where the surface bends to one side
+    /// only, as a sphere (both curvatures k) or a cylinder (k and 0), and less the more it is a saddle, whose height knows
+    /// no z².
+    fn bend(&self, l: usize) -> f64 {
+        let mut g = 0.0;
+        for _ in 0..4 {
+            let c = [2, 3, 4].map(|i| self.height[i][l] - g * self.square[i][l]);
+            let (mean, half) = (0.5 * (c[0] + c[2]), 0.5 * (c[0] - c[2]));
+            let apart = (half * half + c[1] * c[1]).sqrt();
+            let length = (mean * mean + apart * apart).sqrt().max(f64::MIN_POSITIVE);
+            let share = (std::f64::consts::SQRT_2 * mean / length).clamp(-1.0, 1.0);
+            g = mean + share * apart;
         }
+        g
+    }
+}
+
+/// Standard deviation of second derivatives, over the mesh's unit: as if what a cubic fit leaves over were noise of all
+/// neighbours alike.
+#[inline(always)]
+fn doubt(group: &Group, fit: &Fit<CUBIC>) -> Lanes {
+    let bend: Lanes = std::array::from_fn(|l| fit.bend(l));
+    let coefficients: [Lanes; CUBIC] =
+        std::array::from_fn(|i| std::array::from_fn(|l| fit.height[i][l] - bend[l] * fit.square[i][l]));
+    let mut left = [0.0f64; LANES];
+    let mut gains = [[0.0f64; LANES]; 3];
+    for [x, y, z] in group.neighbours() {
+        let (terms, weights) = terms(x, y, z);
+        let mut over: Lanes = std::array::from_fn(|l| z[l] - 0.5 * bend[l] * z[l] * z[l]);
+        let mut gain = [[0.0f64; LANES]; 3];
+        for i in 0..CUBIC {
+            subtract_product(&mut over, coefficients[i], terms[i]);
+            for (gain, row) in gain.iter_mut().zip(&fit.inverse) {
+                add_product(gain, row[i], terms[i]);
+            }
+        }
+        add_product(&mut left, over, over);
+        for (sum, gain) in gains.iter_mut().zip(&mut gain) {
+            multiply(gain, weights);
+            multiply(gain, weights);
+            add_product(sum, *gain, *gain);
+        }
+    }
+    std::array::from_fn(|l| {
+        let free = group.counts[l].saturating_sub(CUBIC).max(1) as f64;
+        let gain = gains[0][l].max(gains[1][l]).max(gains[2][l]);
+        (left[l] / free * gain).sqrt() * group.inverse[l]
+    })
+}
+
+/// Terms of a fit, of which the first ones are taken, and weights of neighbours in one through the point: over their squared
+/// distance.
+#[inline(always)]
+fn terms(x: &Lanes, y: &Lanes, z: &Lanes) -> ([Lanes; FREE], Lanes) {
+    let mut terms = [[1.0f64; LANES]; FREE];
+    let mut weights = [0.0f64; LANES];
+    for l in 0..LANES {
+        let (x, y, z) = (x[l], y[l], z[l]);
+        let (x2, xy, y2) = (x * x, x * y, y * y);
+        let monomials = [x, y, 0.5 * x2, xy, 0.5 * y2, x2 * x, x2 * y, x * y2, y2 * y];
+        for (term, monomial) in terms.iter_mut().zip(monomials) {
+            term[l] = monomial;
+        }
+        weights[l] = 1.0 / (x2 + y2 + z * z + NEAREST);
+    }
+    (terms, weights)
+}
+
+/// Least squares of `z` and of `z²/2` on `x, y, x²/2, xy, y²/2`, with nine coefficients the cubic monomials, each neighbour
+/// over its squared distance, and with ten a constant, all neighbours and the point itself alike: normal equations by Cholesky, in
+/// every lane.
+#[inline(always)]
+fn solve<const N: usize>(group: &Group) -> Fit<N> {
+    let mut matrix = [[[0.0f64; LANES]; N]; N];
+    let mut rights = [[[0.0f64; LANES]; N]; 5];
+    for (row, right) in [2, 3, 4].into_iter().zip(&mut rights[2..]) {
+        right[row] = [1.0; LANES];
+    }
+    if N == FREE {
+        matrix[N - 1][N - 1] = [1.0; LANES];
+    }
+    for (i, [x, y, z]) in group.neighbours().iter().enumerate() {
+        let (mut all, mut weights) = terms(x, y, z);
+        if N == FREE {
+            weights = std::array::from_fn(|l| f64::from(u8::from(i < group.counts[l])));
+        }
+        all.iter_mut().for_each(|term| multiply(term, weights));
+        let goals: [Lanes; 2] = [
+            std::array::from_fn(|l| weights[l] * z[l]),
+            std::array::from_fn(|l| 0.5 * weights[l] * z[l] * z[l]),
+        ];
         for i in 0..N {
             for (right, goal) in rights.iter_mut().zip(goals) {
                 add_product(&mut right[i], all[i], goal);
@@ -384,5 +525,6 @@ fn solve<const N: usize>(neighbours: &[[Lanes; 3]]) -> ([[Lanes; N]; 2], [bool; 
             multiply(&mut right[i], matrix[i][i]);
         }
     }
-    (rights, solved)
+    let [height, square, xx, xy, yy] = rights;
+    Fit { height, square, inverse: [xx, xy, yy], solved }
 }

@@ -4,6 +4,7 @@
 use glam::{DVec2, DVec3, Vec3, dvec2, dvec3};
 
 /// A mesh over a grid of parameters, and what is true at each vertex.
+#[derive(Clone)]
 pub(crate) struct Shape {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) normals: Vec<Vec3>,
