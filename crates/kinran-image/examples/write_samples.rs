@@ -46,7 +46,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// A mip chain of coloured waves, flat in one corner, each level painted by itself.
+/// A mip chain of coloured waves, flat in one corner, each level painted by itself; alpha is cut off at 1, so that blocks
+/// have opaque texels beside others.
 fn sample(format: Format, transfer: Transfer, width: u32, height: u32) -> Result<Texture, Error> {
     let mut levels = Vec::new();
     for i in 0..full_level_count(width, height) {
@@ -58,6 +59,7 @@ fn sample(format: Format, transfer: Transfer, width: u32, height: u32) -> Result
                 _ => [(9.0 * u).sin(), (9.0 * v).cos(), (7.0 * (u + v)).sin(), (5.0 * (u - v)).cos()]
                     .map(|wave: f32| 0.5 + 0.5 * wave),
             })
+            .map(|[r, g, b, a]| [r, g, b, (1.3 * a).min(1.0)])
             .collect();
         let data = if format == Format::Rgba16F {
             encode_half(&texels)?

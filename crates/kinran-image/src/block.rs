@@ -10,7 +10,7 @@ use half::slice::HalfFloatSliceExt;
 use rayon::prelude::*;
 
 use crate::image::check_sides;
-use crate::opaque::keep_opaque;
+use crate::opaque::{keep_opaque, with_own_alpha};
 use crate::{Error, Format};
 
 /// Who compresses blocks.
@@ -216,6 +216,9 @@ fn encode_strip(
                 // At its fastest the portable encoder knows only modes that store alpha by itself here.
                 let encoding = Encoding { preset: Preset::Fast, ..encoding };
                 encode_portable(encoding, texels.as_flattened(), 4, block)?;
+                if loses_opaque_texels(&texels, block) {
+                    *block = with_own_alpha(&texels);
+                }
             }
         }
     }
