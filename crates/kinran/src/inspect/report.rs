@@ -33,6 +33,9 @@ pub(crate) struct Report {
     members: Vec<Member>,
     /// The files that it names.
     written: Vec<Checked>,
+    /// Those of earlier runs that it keeps in mind.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    kept: Vec<Checked>,
     warnings: Vec<String>,
 }
 
@@ -77,8 +80,9 @@ pub(super) fn inspect(path: &Path, console: &Console) -> Result<(), Error> {
         let reason = "is no JSON that kinran writes; give a report such as NAME.kinran.json";
         return Err(Error::file_error(path, reason));
     };
-    let written: Vec<WrittenFile> =
-        json.get("written").and_then(|list| serde_json::from_value(list.clone()).ok()).unwrap_or_default();
+    let files = |member: &str| -> Vec<WrittenFile> {
+        json.get(member).and_then(|list| serde_json::from_value(list.clone()).ok()).unwrap_or_default()
+    };
     let folder = path.parent().unwrap_or(Path::new(""));
     let texts = json.get("warnings").and_then(Value::as_array).into_iter().flatten();
     let report = Report {
@@ -86,7 +90,8 @@ pub(super) fn inspect(path: &Path, console: &Console) -> Result<(), Error> {
         kind,
         written_by,
         members: members(&json),
-        written: written.into_iter().map(|file| check(folder, file)).collect(),
+        written: files("written").into_iter().map(|file| check(folder, file)).collect(),
+        kept: files("kept").into_iter().map(|file| check(folder, file)).collect(),
         warnings: texts.filter_map(|text| Some(text.as_str()?.to_owned())).collect(),
     };
     let text = text(&report);
@@ -106,7 +111,7 @@ fn check(folder: &Path, file: WrittenFile) -> Checked {
 
 fn members(json: &Value) -> Vec<Member> {
     let members = json.as_object().into_iter().flatten();
-    let shown = members.filter(|(name, _)| !["written", "warnings"].contains(&name.as_str()));
+    let shown = members.filter(|(name, _)| !["written", "kept", "warnings"].contains(&name.as_str()));
     let value = |value: &Value| match value {
         Value::String(text) => Some(text.clone()),
         Value::Number(_) | Value::Bool(_) => Some(value.to_string()),
@@ -129,9 +134,12 @@ fn text(report: &Report) -> String {
     facts.extend(report.warnings.iter().map(|warning| row("warning", warning.clone())));
     let mut text = list(&facts);
     if !report.written.is_empty() {
-        let files = report.written.iter();
-        let rows = files.map(|f| vec![f.file.clone(), bytes_text(f.bytes as u64), f.state.name().into()]);
-        text += &format!("\n{}", list(&rows.collect::<Vec<_>>()));
+        let row = |f: &Checked, of: &str| {
+            vec![f.file.clone(), bytes_text(f.bytes as u64), format!("{}{of}", f.state.name())]
+        };
+        let written = report.written.iter().map(|f| row(f, ""));
+        let kept = report.kept.iter().map(|f| row(f, ", by an earlier run with other flags"));
+        text += &format!("\n{}", list(&written.chain(kept).collect::<Vec<_>>()));
     }
     text
 }

@@ -199,6 +199,11 @@ fn a_report_hides_that_its_files_have_changed() {
     assert_eq!(state(&said, "square.glb"), "changed");
     assert_eq!(state(&said, "square_hammered_normal.ktx2"), "missing");
     assert_eq!(state(&said, "square_hammered_roughness.ktx2"), "as-written");
+    assert_eq!(said.get("kept"), None);
+    kinran_json(&["bake", text(&model), "-o", text(&out), "--container", "dds", "--force"]);
+    let said = kinran_json(&["inspect", text(&report)]);
+    let kept = said["kept"].as_array().unwrap();
+    assert!(kept.iter().any(|f| f["file"] == "square_hammered_roughness.ktx2"), "{said}");
     let other = folder.path().join("other.json");
     std::fs::write(&other, "{ \"a\": 1 }").unwrap();
     crate::common::refused(&["inspect", text(&other)], &["other.json", "no JSON that kinran writes"]);
