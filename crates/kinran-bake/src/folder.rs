@@ -465,7 +465,8 @@ fn warn_of_tiles(materials: &mut [MaterialMaps]) {
 /// What is assumed of a material that matters and that a flag settles, a sentence each.
 fn assumptions(material: &MaterialMaps, files: &[Found], hints: &Hints, strangers: &[Found]) -> Vec<String> {
     let name = &material.name;
-    let seen: Vec<String> = strangers.iter().map(|file| file.file.clone()).collect();
+    let asked = strangers.iter().filter(|file| file.dropped.is_none());
+    let seen: Vec<String> = asked.map(|file| file.file.clone()).collect();
     let seen = if seen.is_empty() { String::new() } else { format!("; not recognised: {}", listed(&seen)) };
     let mut warnings = Vec::new();
     if is_flat(material) {

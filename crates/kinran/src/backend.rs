@@ -36,12 +36,13 @@ impl Backend {
     /// # Errors
     /// Where there is no device, or a shader does not compile.
     #[cfg_attr(not(feature = "gpu"), allow(unused_variables, reason = "only a GPU has shaders"))]
-    pub(crate) fn open(self, shaders: Option<&Path>) -> Result<Painter, Error> {
+    pub(crate) fn open(self, shaders: Option<&Path>, progress: &Progress) -> Result<Painter, Error> {
         match self {
             Backend::Cpu => Ok(Painter::Cpu),
             #[cfg(feature = "gpu")]
             Backend::Gpu => {
                 let source = ShaderSource { folder: shaders.map(Path::to_owned) };
+                let _starting = progress.busy("starting the GPU");
                 // Nothing is shown on a display, so any format will do.
                 let open = || -> Result<_, RenderError> {
                     Realtime::new(&Gpu::open()?, &source, wgpu::TextureFormat::Rgba8Unorm)
@@ -89,7 +90,9 @@ impl Painter {
             Painter::Cpu => view.render(scene, name, samples_per_pixel, filtering, progress),
             #[cfg(feature = "gpu")]
             Painter::Gpu(renderer) => {
+                let loading = progress.busy("bringing the scene to the GPU");
                 let scene = renderer.load(scene, &renderer.light_of(scene), filtering);
+                drop(loading);
                 let stage = progress.stage(name, u64::from(samples_per_pixel));
                 let (settings, samples) = (settings(view), samples_per_pixel);
                 Ok(renderer.film(&scene, &view.camera, &settings, view.size, samples, &|_, _| {

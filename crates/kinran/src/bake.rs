@@ -81,7 +81,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t)]
     pub edges: Edges,
 
-    /// Which maps hold the lobe; the default is aniso for folders and khr for glTF
+    /// Which maps hold the lobe; the default is aniso for folders and khr for glTF, which khr's maps are always written for
     #[arg(long, value_enum)]
     pub form: Option<Form>,
 
@@ -454,6 +454,13 @@ fn with_a_way(error: Error, console: &Console) -> Error {
         return Error::file_error(folder, reason);
     }
     match Survey::of(folder, &console.progress()) {
+        Ok(survey) if survey.only_model().is_some() => {
+            let model = folder.join(survey.only_model().unwrap_or(Path::new("")));
+            Error::file_error(
+                folder,
+                format!("holds no maps, but a model; `kinran bake {}` bakes it", model.display()),
+            )
+        }
         Ok(survey) if !survey.is_empty() => {
             let way = format!("`kinran init {}` writes a {MANIFEST} for them", folder.display());
             Error::file_error(folder, format!("holds no maps, but {}; {way}", survey.counts()))

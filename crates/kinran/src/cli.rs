@@ -37,7 +37,7 @@ use crate::{
 
 Angles are degrees. `kinran help COMMAND` tells all about a command.
 Exit codes: 0 done, 2 something in the input or the flags is wrong, 1 a defect of the program, \
-130 interrupted. With --json standard output is one JSON document in any case: the result, or {\"error\": ...}; docs/json.md \
+130 interrupted. With --json standard output is one JSON document, unless interrupted: the result, or {\"error\": ...}; docs/json.md \
 tells more.")]
 struct Cli {
     #[command(subcommand)]
@@ -218,6 +218,15 @@ fn shortened(mut error: clap::Error) -> clap::Error {
             _ => None,
         })
         .collect();
+    // clap's "to pass '--size' as a value, use '-- --size'": nobody means that.
+    if let Some(ContextValue::StyledStrs(tips)) = error.get(ContextKind::Suggested) {
+        let sound: Vec<_> =
+            tips.iter().filter(|tip| !tip.to_string().contains(" as a value")).cloned().collect();
+        match sound.is_empty() {
+            true => drop(error.remove(ContextKind::Suggested)),
+            false => drop(error.insert(ContextKind::Suggested, ContextValue::StyledStrs(sound))),
+        }
+    }
     if !long.is_empty() {
         // What it suggests would have it once more.
         error.remove(ContextKind::Suggested);

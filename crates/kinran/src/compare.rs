@@ -497,6 +497,8 @@ fn find(options: &Options, truth: &Taken, drawn: &Taken, errors: &[&Measured]) -
     let [a, b] = [0, 1].map(|half| options.view.display(&truth.halves[half]));
     let Difference { distance, width, height, .. } = errors[0].difference;
     let noise = Noise { rmse: rmse_srgb8(&a, &b)?, flip: flip(&a, &b, width, height)?.mean };
+    let squares: Vec<&Errors> = errors.iter().map(|m| &m.squares).collect();
+    let only_noise = squares.iter().all(|errors| errors.is_noise());
     let ranking = |order: Order, printed: Vec<f64>, unit: &dyn Fn(f64) -> f64| {
         // What looks equal is equally good.
         let digits = |x: f64| (x * 1e4).round();
@@ -513,7 +515,6 @@ fn find(options: &Options, truth: &Taken, drawn: &Taken, errors: &[&Measured]) -
             nearest,
         }
     };
-    let squares: Vec<&Errors> = errors.iter().map(|m| &m.squares).collect();
     let flips: Vec<&Errors> = errors.iter().map(|m| &m.flip).collect();
     let by_squares = order(&squares, 0.0);
     let first = errors[by_squares.first].difference.rmse;
@@ -530,7 +531,7 @@ fn find(options: &Options, truth: &Taken, drawn: &Taken, errors: &[&Measured]) -
             errors.iter().map(|m| m.difference.flip.into()).collect(),
             &|flip| flip,
         ),
-        only_noise: squares.iter().all(|errors| errors.is_noise()),
+        only_noise,
         says: String::new(),
     };
     finding.says = finding.sentence();

@@ -200,9 +200,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     };
     let pictures = sheets.iter().map(|&sheet| output.join(sheet_file(sheet)));
     args.view.refuse_inputs(&args.file, pictures)?;
-    let painter = args.backend.open(None)?;
+    let painter = args.backend.open(None, &console.progress())?;
     let realtime = match sheets.contains(&Sheet::Realtime) {
-        true => Some(Backend::Gpu.open(None)?),
+        true => Some(Backend::Gpu.open(None, &console.progress())?),
         false => None,
     };
     let progress = console.progress();
@@ -223,7 +223,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let prepared = view.scene(&scene, surfaces, &progress)?;
     let left_out = painter.left_out(&view, &prepared);
     let told = scene.warnings.iter().chain(view.environment_notes()).cloned();
-    let warnings: Vec<String> = told.chain(apart).chain(left_out).collect();
+    let bare = (args.density == 0.0).then(|| "--density 0: there are no fibres to see".to_owned());
+    let warnings: Vec<String> = told.chain(apart).chain(left_out).chain(bare).collect();
     warnings.iter().for_each(|w| console.warn(w));
     let plain = args.view.light.is_empty()
         && scene.lights.is_empty()

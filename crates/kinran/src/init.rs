@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::detail::KindName;
 use crate::outputs::has_extension;
 use crate::values::counted;
-use crate::{Console, Error, Progress};
+use crate::{Console, Error, Progress, Stage};
 
 /// Writes a kinran.toml that lists what a folder holds, for `kinran bake kinran.toml`
 ///
@@ -96,6 +96,9 @@ struct Detail {
 /// # Errors
 /// Where there is nothing to bake, or a manifest already.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    if args.folder.is_file() {
+        return Err(Error::file_error(&args.folder, "is a file; name the folder that it is in"));
+    }
     let manifest = args.folder.join(MANIFEST);
     if manifest.exists() && !args.dry_run {
         let again = format!("kinran init {} --dry-run", args.folder.display());
@@ -143,15 +146,21 @@ impl Survey {
     /// # Errors
     /// Where `root` cannot be read; what cannot be read below it is left out.
     pub(crate) fn of(root: &Path, progress: &Progress) -> Result<Self, Error> {
-        let _busy = progress.busy("looking through folders");
+        let stage = progress.busy("looking through folders");
         let mut found = Found::default();
         found.visit(root, Path::new(""))?;
-        Ok(found.judge(root))
+        Ok(found.judge(root, &stage))
     }
 
     /// Whether there is nothing to bake.
     pub(crate) fn is_empty(&self) -> bool {
         self.folders.is_empty() && self.models.is_empty() && self.details.is_empty()
+    }
+
+    /// The model, where there is nothing else.
+    pub(crate) fn only_model(&self) -> Option<&Path> {
+        let [model] = self.models.as_slice() else { return None };
+        (self.folders.is_empty() && self.details.is_empty()).then_some(model)
     }
 
     /// "61 folders with maps and 2 models".
@@ -331,9 +340,11 @@ impl Found {
     }
 
     /// Keeps what can be baked as it is.
-    fn judge(mut self, root: &Path) -> Survey {
+    fn judge(mut self, root: &Path, stage: &Stage) -> Survey {
+        stage.expect((self.models.len() + self.folders.len()) as u64);
         let mut of_models: HashSet<PathBuf> = HashSet::new();
         for model in std::mem::take(&mut self.models) {
+            stage.add(1);
             match Document::open(root.join(&model)) {
                 Ok(document) => {
                     of_models.extend(document.files().iter().filter_map(|file| file.canonicalize().ok()));
@@ -343,15 +354,15 @@ impl Found {
             }
         }
         for folder in std::mem::take(&mut self.folders) {
+            stage.add(1);
             let full = root.join(&folder);
             let maps = named_maps(&full).unwrap_or_default();
             let of_model = |path: &PathBuf| path.canonicalize().is_ok_and(|path| of_models.contains(&path));
             if maps.iter().all(|(path, ..)| of_model(path)) {
                 continue;
             }
-            let understood = scan(&full, &Hints::default()).and_then(|found| {
-                found.materials.iter().try_for_each(|material| material.compare_twins().map(drop))
-            });
+            let understood = scan(&full, &Hints::default())
+                .and_then(|found| found.materials.iter().try_for_each(|material| material.load().map(drop)));
             match understood {
                 Ok(_) if folder == Path::new("") => {
                     let bake = format!("kinran bake {}", root.display());

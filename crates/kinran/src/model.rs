@@ -13,7 +13,7 @@ use serde::Deserialize;
 
 use crate::content::Content;
 use crate::view::file_name;
-use crate::{Error, Progress};
+use crate::{Error, Progress, outputs};
 
 /// The flag about files that a model names.
 #[derive(Clone, Debug, Default, PartialEq, Eq, clap::Args)]
@@ -153,6 +153,11 @@ impl Model {
                 let mut scene = read_scene(&path, args, &Needs::ALL, progress)?;
                 let not_drawn = not_drawn(&scene);
                 scene.warnings.extend(not_drawn);
+                let lacks = scene.primitives.iter().any(|p| p.source.lacks_normals);
+                if lacks && outputs::has_extension(&path, "obj") {
+                    let faceted = "has no normals and is drawn with facets; export it with normals for a smooth surface";
+                    scene.warnings.push(format!("{}: {faceted}", path.display()));
+                }
                 Ok(Model { path, scene, only_baked: false })
             }
             Place::Textures(path, sidecars) => {

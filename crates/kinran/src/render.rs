@@ -105,11 +105,15 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let output = args.output.clone().unwrap_or_else(|| outputs::named_after(&args.file, ".render.png"));
     outputs::check_file(&output, &["png", "exr"])?;
     args.view.refuse_inputs(&args.file, [output.clone()])?;
-    let painter = args.backend.open(args.shaders.as_deref())?;
+    if let Some(folder) = args.shaders.as_ref().filter(|_| args.backend == Backend::Cpu) {
+        let reason = "needs --backend gpu, which draws with shaders; add it, or leave the flag out";
+        return Err(Error::flag_error(format!("--shaders {}", folder.display()), reason));
+    }
     let progress = console.progress();
+    let painter = args.backend.open(args.shaders.as_deref(), &progress)?;
     let Model { path, scene, only_baked } = Model::open(&args.file, &args.view.model, &progress)?;
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
-    let own = Mips::of(&scene);
+    let own = if only_baked { Mips::Baked } else { Mips::of(&scene) };
     let mips = args.filter.unwrap_or(own);
     let refuse =
         |reason: &str| Err(Error::flag_error_of(&path, format!("--filter {}", mips_name(mips)), reason));

@@ -227,8 +227,7 @@ fn write(
         std::fs::read(folder.join(name)).is_ok_and(|there| there != *bytes)
     };
     if let Some((name, _)) = files.iter().find(other).filter(|_| !force) {
-        let reason =
-            "is there with another content; name another folder with --output, or overwrite it with --force";
+        let reason = "is there with another content; give each language a folder of its own with --output, or overwrite it with --force";
         return Err(Error::file_error(folder.join(name), reason));
     }
     std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;

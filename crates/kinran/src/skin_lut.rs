@@ -60,7 +60,8 @@ pub struct Args {
     pub profile: Option<PathBuf>,
 
     /// Burley's normalised diffusion: d of red, green and blue, mm
-    #[arg(long, value_name = "R,G,B", value_parser = triple, conflicts_with = "mean_free_path")]
+    #[arg(long, value_name = "R,G,B", value_parser = triple,
+        conflicts_with_all = ["mean_free_path", "albedo"])]
     pub burley: Option<[f64; 3]>,
 
     /// Burley's normalised diffusion by mean free path, mm

@@ -101,7 +101,8 @@ fn part(text: &str) -> Result<[f32; 4], String> {
         Ok(&[x, y, w, h]) if x >= 0.0 && y >= 0.0 && w > 0.0 && h > 0.0 && x + w <= 1.0 && y + h <= 1.0 => {
             Ok([x, y, w, h])
         }
-        _ => Err("write left, top, width and height, such as 0.25,0,0.5,0.5".into()),
+        _ => Err("write left, top, width and height of a part inside of the picture, such as 0.25,0,0.5,0.5"
+            .into()),
     }
 }
 
@@ -229,6 +230,8 @@ fn approach(view: &mut View, scene: &RenderScene) {
     const STEP: usize = 4;
     /// What is beyond this share of the range counts no more: tips and edges are no reason to look at them.
     const ENOUGH: f32 = 0.2;
+    /// A part is worth a look from this share of the range on, in the mean; chosen by eye.
+    const ROUND: f32 = 0.02;
     let shorter = view.size.0.min(view.size.1);
     let [columns, rows] = [view.size.0, view.size.1].map(|side| (side * RAYS / shorter).max(8));
     let camera = PictureCamera::new(&view.camera, columns, rows);
@@ -253,7 +256,8 @@ fn approach(view: &mut View, scene: &RenderScene) {
     let weight = |&(left, top): &(usize, usize)| inside(left, top).map(|(weight, _)| weight).sum::<f32>();
     let Some((left, top)) = places.max_by(|a, b| weight(a).total_cmp(&weight(b))) else { return };
     let (sum, count) = inside(left, top).fold((Vec3::ZERO, 0u32), |(sum, n), (_, p)| (sum + p, n + 1));
-    if count == 0 {
+    // Where curvature is alike in all directions, as on a ball, no part shows more than the whole.
+    if weight(&(left, top)) <= ROUND * range * count as f32 {
         return;
     }
     // The new axis goes through the middle of the part, at the mean depth of what is seen in it.

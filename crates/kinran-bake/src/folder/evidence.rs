@@ -165,7 +165,10 @@ pub fn odd_lengths(image: &Image) -> Option<String> {
     let share = rows.iter().map(|row| row.0).sum::<usize>() as f64 / count as f64;
     let (least, most) = rows.iter().fold((f64::INFINITY, 0.0f64), |(a, b), row| (a.min(row.1), b.max(row.2)));
     (share > LENGTHS_SHARE).then(|| {
-        format!("{:.0} % of its vectors are not of unit length ({least:.2} to {most:.2})", share * 100.0)
+        format!(
+            "{:.0} % of its vectors are not of unit length, by more than 0.1 ({least:.2} to {most:.2})",
+            share * 100.0
+        )
     })
 }
 

@@ -230,8 +230,14 @@ pub(super) fn mark_skin(
             .filter(|&i| name == "all" || scene.materials[i].name == *name)
             .collect();
         if chosen.is_empty() {
-            let names: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
-            let reason = format!("there is no such material; there are {}", names.join(", "));
+            let names: Vec<&str> =
+                scene.materials.iter().take(document.material_count()).map(|m| m.name.as_str()).collect();
+            let reason = match names.as_slice() {
+                [] => {
+                    "the file has no materials; give its meshes one in the program that they come from".into()
+                }
+                names => format!("there is no such material; there are {}", names.join(", ")),
+            };
             return Err(Error::flag_error_of(document.path(), format!("--skin {name}"), reason));
         }
         for i in chosen {

@@ -18,7 +18,12 @@ use crate::{Console, Error};
 /// Bakes a folder and tells what came of it.
 pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let mut folder = scan(&args.input, &args.hints())?;
-    let reports = bake_folder(args, console)?;
+    let idle = idle(args, &folder.rows);
+    let mut reports = bake_folder(args, console)?;
+    idle.iter().for_each(|warning| console.warn(warning));
+    if let Some(first) = reports.first_mut() {
+        first.warnings.extend(idle);
+    }
     for surface in reports.iter().flat_map(|report| &report.surfaces) {
         for input in &surface.inputs {
             add_remarks(&mut folder.rows, &surface.name, &input.file, &input.notes);
@@ -27,6 +32,42 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let files: String = reports.iter().map(|report| report.text(args.output())).collect();
     let text = format!("{}\n{files}", folder.table());
     console.result(&BakeReport::new(args, folder.rows, reports), &text)
+}
+
+/// A sentence for each flag that had nothing to act on.
+fn idle(args: &Args, rows: &[Row]) -> Vec<String> {
+    use MapRole::{Color, Direction, DirectionAngle, Normal, Roughness};
+    let is_used = |row: &&Row| row.channels != "-";
+    let has = |roles: &[MapRole]| {
+        rows.iter().filter(is_used).any(|row| row.role.is_some_and(|role| roles.contains(&role)))
+    };
+    let has_packed = rows.iter().filter(is_used).any(|row| row.role.is_some_and(MapRole::is_packed));
+    let has_note = |words: &str| rows.iter().any(|row| row.note.contains(words));
+    let missing = |what: &str| format!("there is no {what} map");
+    let flags = [
+        ("y-up", args.y_up && !has(&[Normal]), missing("normal")),
+        ("y-down", args.y_down && !has(&[Normal]), missing("normal")),
+        ("normal-blue", args.normal_blue && !has(&[Normal]), missing("normal")),
+        ("force-normal", args.force_normal && !has(&[Normal]), missing("normal")),
+        (
+            "direction-span",
+            args.direction_span.is_some() && !has(&[Direction, DirectionAngle]),
+            missing("direction"),
+        ),
+        (
+            "roughness",
+            args.roughness.is_some() && !has_note("by --roughness"),
+            "maps give the roughness; leave these out with --ignore FILE".into(),
+        ),
+        (
+            "roughness-is-gloss",
+            args.roughness_is_gloss && !has_packed && !has(&[Roughness]),
+            missing("roughness"),
+        ),
+        ("color-space", args.color_space.is_some() && !has(&[Color]), missing("colour")),
+    ];
+    let given = flags.into_iter().filter(|(_, is_idle, _)| *is_idle);
+    given.map(|(flag, _, why)| format!("--{flag} has nothing to act on: {why}")).collect()
 }
 
 /// Adds what was chosen when a file was read to its row.
@@ -54,6 +95,7 @@ pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
     }
     drop(stage);
     check_output(args, console, &folder.materials)?;
+    report.warnings.extend(idle(args, &folder.rows));
     report.warnings.iter().for_each(|warning| console.warn(warning));
     console.result(&BakeReport::new(args, folder.rows.clone(), vec![report]), &folder.table())
 }

@@ -293,7 +293,13 @@ pub(super) fn space(args: &Args) -> Result<Space, Error> {
                 (args.form.is_some_and(Form::aniso), Sheet::Aniso),
             ];
             let wanted = sheets.into_iter().filter(|(wanted, _)| *wanted);
-            wanted.for_each(|(_, sheet)| space.add(texture(sheet, size)));
+            wanted.for_each(|(_, sheet)| {
+                space.add(texture(sheet, size));
+                // A PNG of level 0 beside it, where a factor is baked in.
+                let fallback =
+                    if sheet == Sheet::Aniso { 0 } else { 3 * u64::from(size.0) * u64::from(size.1) };
+                space.most += fallback;
+            });
         }
         for slot in
             [Slot::BaseColor, Slot::Emissive, Slot::Occlusion].into_iter().filter(|_| args.all_textures)
@@ -338,6 +344,7 @@ fn check(
         if args.form.is_some_and(Form::aniso) {
             add(Sheet::Aniso);
         }
+        space.most += replaced.len() as u64 * 3 * u64::from(size.0) * u64::from(size.1);
         files.extend(replaced.into_iter().map(|name| format!("{name}.png")));
     }
     for color in &plan.colors {

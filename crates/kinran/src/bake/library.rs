@@ -120,6 +120,8 @@ pub struct EntryReport {
 pub struct LibraryReport {
     /// Where the files are.
     pub output: PathBuf,
+    /// Nothing was baked or removed.
+    pub dry_run: bool,
     /// The entries, in the manifest's order.
     pub entries: Vec<EntryReport>,
     /// Entries that the cache let go, to stay below its limit.
@@ -182,7 +184,8 @@ impl LibraryReport {
             text += &format!("gone from the manifest, --prune removes them: {}\n", named(&self.left_over));
         }
         if !self.pruned.is_empty() {
-            text += &format!("removed: {}\n", named(&self.pruned));
+            let what = if self.dry_run { "would be removed" } else { "removed" };
+            text += &format!("{what}: {}\n", named(&self.pruned));
         }
         text
     }
@@ -319,7 +322,8 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
         }
         let gone = library.gone(&entries);
         let (left_over, pruned) = if args.library.prune { (Vec::new(), gone) } else { (gone, Vec::new()) };
-        let report = LibraryReport { entries, left_over, pruned, space, ..LibraryReport::default() };
+        let report =
+            LibraryReport { dry_run: true, entries, left_over, pruned, space, ..LibraryReport::default() };
         let why = |entry: &EntryReport| Some(format!("{}: {}", entry.name, entry.error.as_ref()?.message));
         let failed = report.entries.iter().filter_map(why).collect();
         return Ok(library.built(report, failed));
@@ -741,6 +745,9 @@ impl Library {
             let inside = path.ancestors().take_while(|inside| *inside != self.output);
             // A folder that holds anything stays.
             inside.take_while(|inside| std::fs::remove_dir(inside).is_ok()).for_each(drop);
+            if path.exists() {
+                console.warn(format!("{}: holds what kinran did not write, and stays", path.display()));
+            }
         }
         Ok(())
     }

@@ -22,8 +22,8 @@ use crate::bake::{Container, PresetName};
 use crate::content::Content;
 use crate::model::ModelArgs;
 use crate::outputs::{
-    Space, WrittenFile, beside, changed_files, check_folder, check_space, has_extension, kept_files,
-    kept_remark, refuse_foreign, refuse_input, replaced_bytes, tell_place,
+    Space, WrittenFile, beside, bytes_text, changed_files, check_folder, check_space, has_extension,
+    kept_files, kept_remark, refuse_foreign, refuse_input, replaced_bytes, tell_place,
 };
 use crate::table::table;
 use crate::values::{exr_layer, exr_layer_of, number};
@@ -666,6 +666,15 @@ fn text(report: &SolveReport, folder: &Path) -> String {
         text += &format!(
             "synthesized {} bytes, shared tiles {}; the target alone {}, a unique map as fine as the tiles {}\n",
             c.synthesized_bytes, c.shared_bytes, c.target_bytes, c.unique_bytes
+        );
+    }
+    for r in &report.resolutions {
+        text += &format!(
+            "at {}x{}: error {:.3} at the target's resolution, {}\n",
+            r.width,
+            r.height,
+            r.error,
+            bytes_text(r.bytes)
         );
     }
     text += "blended error: root mean square against the target, in steps of 8 bits, of normals in degrees; not reached: texels that no \

@@ -141,7 +141,12 @@ pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
         // Constants are what was asked for, not a summary of it.
         Some(language) => Console { quiet: false, ..console.clone() }
             .result(&report, &constants(&fit, report.warning.as_deref(), language)),
-        None => console.result(&report, &text(&fit, tabulated, report.warning.as_deref())),
+        None => {
+            let files = [("the table is in", &args.table), ("plots are in", &args.plots)];
+            let files = files.into_iter().filter_map(|(what, path)| Some((what, path.as_ref()?)));
+            let files: String = files.map(|(what, path)| format!("\n{what} {}", path.display())).collect();
+            console.result(&report, &(text(&fit, tabulated, report.warning.as_deref()) + &files))
+        }
     }
 }
 

@@ -135,7 +135,7 @@ fn text(report: &Report) -> String {
         facts.push(row(
             "normals",
             format!(
-                "{} of texels are not of unit length, {} point below the surface",
+                "{} of texels are more than {LENGTH_TOLERANCE} off unit length, {} point below the surface",
                 percent(normals.not_unit_share),
                 percent(normals.below_share)
             ),

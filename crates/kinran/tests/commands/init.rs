@@ -37,6 +37,9 @@ fn what_init_writes_is_baked_as_it_stands() {
     material(&root.join("materials/odd"), "odd");
     material(&root.join("materials/odd"), "odd_2_NormalGL");
     grey(&root.join("materials/odd/odd_Normal-ogl.png"));
+    // One whose normals are none: its texels say so.
+    std::fs::create_dir_all(root.join("materials/plain")).unwrap();
+    grey(&root.join("materials/plain/plain_normal.png"));
     material(&root.join("done"), "done");
     std::fs::write(root.join("done/done.kinran.json"), "{}").unwrap();
     material(&root.join(".hidden"), "hidden");
@@ -72,9 +75,15 @@ fn what_init_writes_is_baked_as_it_stands() {
     assert_eq!(counts, [4, 2, 2], "{written}");
     let left_out: Vec<&str> =
         report["left_out"].as_array().unwrap().iter().map(|left| left["path"].as_str().unwrap()).collect();
-    for path in
-        ["materials/odd", "props/torn.glb", "props/cow.obj", "targets/boot_color.png", "later", "photos"]
-    {
+    for path in [
+        "materials/odd",
+        "materials/plain",
+        "props/torn.glb",
+        "props/cow.obj",
+        "targets/boot_color.png",
+        "later",
+        "photos",
+    ] {
         assert!(left_out.contains(&path) && written.contains(&format!("# {path}: ")), "{path}: {written}");
     }
     assert!(!written.contains("hidden") && !written.contains("done"), "{written}");

@@ -320,6 +320,18 @@ fn a_folder_of_baked_textures_is_laid_on_a_board() {
     refused(&["render", text(&maps), "-o", text(&out)], &["no .glb", "bake one"]);
 }
 
+#[test]
+fn a_folder_of_baked_colour_alone_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (maps, baked) = (folder.path().join("maps"), folder.path().join("baked"));
+    std::fs::create_dir(&maps).unwrap();
+    let red = Image::new(1, 1, Channels::Rgb, Pixels::U8(vec![200, 10, 10])).unwrap();
+    std::fs::write(maps.join("tin_baseColor.png"), encode_png(&red).unwrap()).unwrap();
+    assert_eq!(kinran(&["bake", text(&maps), "-o", text(&baked)]).code, Some(0));
+    let middle = far(&baked, &["--from", "0,0,1"], &folder.path().join("out.png"))[32 * 64 + 32];
+    assert!(middle[0] > 40 && middle[0] > 2 * middle[1], "a red board, got {middle:?}");
+}
+
 /// A clearcoat that no picture shows is told, once for all materials that have one.
 #[test]
 fn what_is_not_drawn_is_left_out_in_silence() {

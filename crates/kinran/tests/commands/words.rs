@@ -110,6 +110,40 @@ fn a_dry_run_finds_less_than_the_bake() {
 }
 
 #[test]
+fn a_flag_for_maps_that_are_not_there_is_swallowed() {
+    let folder = tempfile::tempdir().unwrap();
+    let grey = Image::new(4, 4, Channels::R, Pixels::U8(vec![90; 16])).unwrap();
+    write_png(&folder.path().join("tin_roughness.png"), &grey).unwrap();
+    let out = folder.path().join("out");
+    let cases: [&[&str]; 7] = [
+        &["--roughness", "0.3"],
+        &["--y-down"],
+        &["--y-up"],
+        &["--normal-blue"],
+        &["--force-normal"],
+        &["--direction-span", "180"],
+        &["--color-space", "linear"],
+    ];
+    for flags in cases {
+        for more in [&["-v"][..], &["--dry-run"]] {
+            let words = [&["bake", text(folder.path()), "-o", text(&out)], flags, more].concat();
+            let said = kinran(&words);
+            let wanted = format!("{} has nothing to act on", flags[0]);
+            assert!(
+                said.code == Some(0) && said.err.contains(&wanted),
+                "{words:?}: wanted {wanted}: {}",
+                said.err
+            );
+        }
+    }
+    let said = kinran(&["bake", text(folder.path()), "-o", text(&out)]);
+    assert!(!said.err.contains("nothing to act on"), "{}", said.err);
+    let model = folder.path().join("a.glb");
+    let words = ["render", text(&model), "--shaders", text(folder.path())];
+    refused(&words, &["--shaders", "needs --backend gpu"]);
+}
+
+#[test]
 fn a_report_lies_nobody_knows_where() {
     let folder = tempfile::tempdir().unwrap();
     let (library, out) = (folder.path().join("library"), folder.path().join("out"));
