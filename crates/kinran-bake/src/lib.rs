@@ -14,7 +14,6 @@ mod patterns;
 pub mod skin_lut;
 pub mod stamps;
 
+pub use kinran_image::srgb::{linear_from_srgb, srgb_from_linear};
 pub use material::{MaterialSurface, NoSurface, material_surface};
-pub use mips::{
-    BAND_ROWS, Rgba8Level, bake_plain, linear_from_srgb, pack_channels, plain_levels, srgb_from_linear,
-};
+pub use mips::{BAND_ROWS, Rgba8Level, bake_plain, pack_channels, plain_levels};

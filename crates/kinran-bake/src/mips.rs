@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use kinran_image::srgb::{linear_from_srgb, srgb_from_linear};
 use kinran_image::{
     Channels, Encoding, Error, Image, Level, Pixels, Texture, Transfer, encode_parallel, full_level_count,
     level_size,
@@ -454,16 +455,6 @@ fn quantise_row(planes: &[f32], transfer: Transfer, out: &mut [u8]) {
 #[inline(always)]
 pub(crate) fn unorm8(v: f32) -> u8 {
     ((v.clamp(0.0, 1.0) * 255.0 + 1e-5) + 8_388_608.0).to_bits() as u8
-}
-
-/// IEC 61966-2-1, sRGB to linear.
-pub fn linear_from_srgb(v: f32) -> f32 {
-    if v <= 0.04045 { v / 12.92 } else { libm::powf((v + 0.055) / 1.055, 2.4) }
-}
-
-/// IEC 61966-2-1, linear to sRGB.
-pub fn srgb_from_linear(v: f32) -> f32 {
-    if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * libm::powf(v, 1.0 / 2.4) - 0.055 }
 }
 
 #[cfg(test)]

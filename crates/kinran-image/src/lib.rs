@@ -7,11 +7,13 @@
 mod block;
 mod dds_file;
 mod error;
+mod format;
 mod image;
 mod ktx2_file;
 mod opaque;
 mod read;
 mod size;
+pub mod srgb;
 mod texture;
 mod texture_file;
 mod unfinished;
@@ -20,11 +22,12 @@ mod write;
 pub use block::{Encoder, Encoding, Preset, Role, decode, encode, encode_half, encode_parallel};
 pub use dds_file::{decode_dds, encode_dds};
 pub use error::{Error, io_reason};
+pub use format::{Format, Transfer};
 pub use image::{Channels, Image, MAX_IMAGE_BYTES, MAX_SIDE, Pixels};
 pub use ktx2_file::{decode_ktx2, encode_ktx2};
 pub use read::{IMAGE_EXTENSIONS, decode_image, has_image_extension, read_image, read_layer};
 pub use size::{image_size, image_size_of};
-pub use texture::{Format, Level, Texture, Transfer, full_level_count, level_size};
+pub use texture::{Level, Texture, full_level_count, level_size};
 pub use texture_file::{decode_texture, read_texture, write_texture};
 pub use unfinished::{Unfinished, remove_unfinished};
 pub use write::{

@@ -1,6 +1,7 @@
 //! From scene radiance to display values.
 
 use glam::{Mat3, Vec3, vec3};
+use kinran_image::srgb::srgb_from_linear;
 
 /// How radiance is brought into the range of a display.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -18,14 +19,8 @@ pub enum Tonemap {
 
 /// The sRGB encoding of a linear value in [0, 1] (IEC 61966-2-1). Values outside are clamped; NaN becomes 0.
 pub fn srgb_oetf(linear: f32) -> f32 {
-    let x = linear.clamp(0.0, 1.0);
-    if x <= 0.003_130_8 {
-        12.92 * x
-    } else if x > 0.0 {
-        1.055 * libm::powf(x, 1.0 / 2.4) - 0.055
-    } else {
-        0.0
-    }
+    // NaN is not above zero.
+    if linear > 0.0 { srgb_from_linear(linear.min(1.0)) } else { 0.0 }
 }
 
 /// Linear display light in [0, 1] for the scene radiance `radiance`, linear Rec. 709.

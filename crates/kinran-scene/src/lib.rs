@@ -20,6 +20,7 @@ mod obj;
 mod scene;
 mod studio;
 mod tangent;
+mod texture_ref;
 
 pub use container::is_gltf;
 pub use detail::{
@@ -32,6 +33,7 @@ pub use fuzz::{FUZZ_EXTENSION, Fuzz, FuzzAttenuation, FuzzDirection, FuzzLayer, 
 pub use load::{Maps, Needs};
 pub use scene::{
     AlphaMode, Anisotropy, Camera, DiffuseTransmission, Instance, Light, LightKind, Material, Pose,
-    Primitive, Scene, Skin, SkinProfile, Source, TextureRef, VertexCurvature, Wrap,
+    Primitive, Scene, Skin, SkinProfile, Source, VertexCurvature,
 };
 pub use tangent::arbitrary as any_tangent;
+pub use texture_ref::{TextureRef, Wrap};

@@ -15,11 +15,11 @@ mod bc5;
 mod bc7;
 
 use kinran_image::Format;
+use kinran_image::srgb::{code_from_linear, linear_from_byte};
 use pulp::Simd;
 
-use super::code::{code_from_linear, linear_from_byte};
 use super::map::MapKind;
-use super::solve::{Blend, Operator, Over, Plain, RUN, Smooth, run_of};
+use super::operator::{Blend, Operator, Over, Plain, RUN, Smooth, run_of};
 
 /// Texels of a block.
 const TEXELS: usize = 16;

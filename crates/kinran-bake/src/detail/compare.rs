@@ -10,8 +10,9 @@ use serde::Serialize;
 
 use super::layer::{DetailRows, Layer, RowRoom, Seen, texture_bytes};
 use super::map::{MapKind, Planes, compress, decoded_level, synthesized_level};
+use super::operator::Blend;
 use super::sample::Fetch;
-use super::solve::{Blend, DetailOptions, Solved, Sums, Target, blend, solve, solve_levels, squared_error};
+use super::solve::{DetailOptions, Solved, Sums, Target, blend, solve, solve_levels, squared_error};
 
 /// Errors of one level by method, each as [`LevelError::error`](super::LevelError::error).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]

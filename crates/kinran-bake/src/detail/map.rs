@@ -1,5 +1,6 @@
 //! Maps as planes of the numbers a sampler filters, level by level.
 
+use kinran_image::srgb::{byte_from_linear, linear_from_byte, linear_from_srgb, linear_of_codes};
 use kinran_image::{
     Channels, Encoding, Error, Format, Image, Level, Pixels, Texture, Transfer, encode, level_size,
 };
@@ -7,9 +8,8 @@ use kinran_scene::Wrap;
 use kinran_shading::normal_from_xy;
 use rayon::prelude::*;
 
-use super::code::{byte_from_linear, linear_from_byte};
 use crate::aniso::{Kernel, Taps};
-use crate::mips::{PlaneRows, TILE, linear_from_srgb, reduce_levels, unorm8};
+use crate::mips::{PlaneRows, TILE, reduce_levels, unorm8};
 
 /// What a map holds, which decides how it is blended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -104,17 +104,10 @@ pub(crate) fn planes_of_image(image: &Image, kind: MapKind, y_down: bool) -> Res
         )));
     }
     let signed = matches!(&image.pixels, Pixels::F32(samples) if samples.iter().any(|v| *v < 0.0));
-    // One number for each code: a power a sample is ten times the work of everything else here.
-    let wide: Vec<f32> = match (&image.pixels, kind) {
-        (Pixels::U16(_), MapKind::Color) => {
-            (0..=65535_u32).into_par_iter().map(|code| linear_from_srgb(code as f32 / 65535.0)).collect()
-        }
-        _ => Vec::new(),
-    };
     let linear = |v: f32| match image.pixels {
         _ if image.transfer == Transfer::Linear => v,
         Pixels::U8(_) => linear_from_byte((v * 255.0 + 0.5) as u8),
-        Pixels::U16(_) => wide[(v * 65535.0 + 0.5) as usize],
+        Pixels::U16(_) => linear_of_codes()[(v * 65535.0 + 0.5) as usize],
         Pixels::F32(_) => linear_from_srgb(v),
     };
 

@@ -23,11 +23,11 @@
 //! tile, is solved against the tile before compression, as in the talk.
 
 mod choose;
-mod code;
 mod compare;
 mod layer;
 mod map;
 mod opacity;
+mod operator;
 mod paint;
 mod pictures;
 mod sample;
@@ -41,6 +41,7 @@ pub use kinran_scene::LayerTransform;
 pub use layer::{Layer, MAX_LAYERS, Mask, Tile, TileOptions, texture_bytes};
 pub use map::{MapKind, Planes};
 pub use opacity::{FADE_TRIALS, bearable_opacity};
+pub use operator::Blend;
 pub use paint::{Paint, PaintGuides};
 pub use pictures::{ERROR_GAIN, LevelPictures, level_pictures};
-pub use solve::{Blend, DetailOptions, LevelError, Solved, Target, blend_level, solve, synthesize};
+pub use solve::{DetailOptions, LevelError, Solved, Target, blend_level, solve, synthesize};

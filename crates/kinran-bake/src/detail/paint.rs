@@ -4,10 +4,10 @@
 //! here are chosen by eye.
 
 use glam::{Vec3, vec3};
+use kinran_image::srgb::byte_from_linear;
 use kinran_image::{Channels, Error, Image, Pixels};
 use kinran_shading::detail::rnm;
 
-use super::code::byte_from_linear;
 use super::layer::{DetailRows, Layer, RowRoom, Seen, Tile, check_layers};
 use super::map::{MapKind, Planes, for_each_row};
 use crate::mips::unorm8;

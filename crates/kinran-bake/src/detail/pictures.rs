@@ -1,11 +1,11 @@
 //! Pictures of a solved level, for people.
 
 use glam::Vec3;
+use kinran_image::srgb::code_from_linear;
 use kinran_image::{Channels, Error, Image, Pixels, Transfer, encode_parallel};
 use kinran_shading::detail::detail_from_texel;
 use kinran_shading::normal_from_xy;
 
-use super::code::code_from_linear;
 use super::layer::{DetailRows, Layer, RowRoom, Seen};
 use super::map::{MapKind, Planes, bytes_of_planes, decoded_level, synthesized_level, texture};
 use super::solve::{DetailOptions, Solved, Target, blend};

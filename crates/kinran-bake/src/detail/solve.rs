@@ -1,13 +1,13 @@
 //! The solver: every texel's `s`, compressed, and how far the blended result is from the target.
 
 use glam::{Vec3, Vec4, vec3};
+use kinran_image::srgb::{byte_from_linear, code_from_linear, linear_from_byte};
 use kinran_image::{
     Channels, Encoding, Error, Format, Image, Level, Pixels, Texture, Transfer, decode, encode,
 };
 use kinran_shading::detail::{
-    detail_from_texel, detail_over, detail_over_inverse, overlay_color, overlay_inverse, overlay_slope, rnm,
-    rnm_inverse, smooth_overlay_color, smooth_overlay_inverse, smooth_overlay_inverse_end,
-    smooth_overlay_inverse_start, smooth_overlay_inverse_step, smooth_overlay_slope,
+    detail_from_texel, detail_over, detail_over_inverse, overlay_color, rnm, rnm_inverse,
+    smooth_overlay_color,
 };
 use kinran_shading::normal_from_xy;
 use rayon::prelude::*;
@@ -15,104 +15,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::choose::{ChooseBand, Stored, can_choose, makes_its_own};
-use super::code::{byte_from_linear, code_from_linear, linear_from_byte};
 use super::layer::{DetailRows, Layer, RowRoom, Seen, check_layers};
 use super::map::{
     MapKind, Planes, bytes_of_planes, for_each_row, mip_chain, planes_of_image, synthesized_level, texture,
 };
-
-/// How colour and data are blended.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Blend {
-    /// The talk's smooth overlay.
-    #[default]
-    Smooth,
-    /// Plain overlay.
-    Plain,
-}
-
-/// The inverse of a blend and its slope.
-#[allow(
-    clippy::needless_range_loop,
-    reason = "loops over lanes of known length are what compilers vectorise"
-)]
-pub(crate) trait Operator: Copy {
-    fn inverse(self, t: f32, d: f32) -> f32;
-    fn slope(self, s: f32, d: f32) -> f32;
-
-    /// The inverse of a run.
-    #[inline(always)]
-    fn inverse_run(self, t: &[f32; RUN], d: &[f32; RUN]) -> [f32; RUN] {
-        let mut s = [0.0; RUN];
-        for i in 0..RUN {
-            s[i] = self.inverse(t[i], d[i]);
-        }
-        s
-    }
-}
-
-/// The talk's.
-#[derive(Clone, Copy)]
-pub(crate) struct Smooth;
-
-/// Overlay as it is.
-#[derive(Clone, Copy)]
-pub(crate) struct Plain;
-
-/// Alpha blending with an opacity.
-#[derive(Clone, Copy)]
-pub(crate) struct Over(pub(crate) f32);
-
-impl Operator for Over {
-    #[inline(always)]
-    fn inverse(self, t: f32, d: f32) -> f32 {
-        if self.0 < 1.0 { (d + (t - d) / (1.0 - self.0)).clamp(0.0, 1.0) } else { t }
-    }
-    #[inline(always)]
-    fn slope(self, _: f32, _: f32) -> f32 {
-        1.0 - self.0
-    }
-}
-
-#[allow(
-    clippy::needless_range_loop,
-    reason = "loops over lanes of known length are what compilers vectorise"
-)]
-impl Operator for Smooth {
-    #[inline(always)]
-    fn inverse(self, t: f32, d: f32) -> f32 {
-        smooth_overlay_inverse(t, d)
-    }
-    #[inline(always)]
-    fn inverse_run(self, t: &[f32; RUN], d: &[f32; RUN]) -> [f32; RUN] {
-        let mut x = [0.0; RUN];
-        for i in 0..RUN {
-            x[i] = smooth_overlay_inverse_start(t[i], d[i]);
-        }
-        for i in 0..RUN {
-            x[i] = smooth_overlay_inverse_step(x[i], t[i], d[i]);
-        }
-        for i in 0..RUN {
-            x[i] = smooth_overlay_inverse_end(x[i], t[i], d[i]);
-        }
-        x
-    }
-    #[inline(always)]
-    fn slope(self, s: f32, d: f32) -> f32 {
-        smooth_overlay_slope(s, d)
-    }
-}
-
-impl Operator for Plain {
-    #[inline(always)]
-    fn inverse(self, t: f32, d: f32) -> f32 {
-        overlay_inverse(t, d)
-    }
-    #[inline(always)]
-    fn slope(self, s: f32, d: f32) -> f32 {
-        overlay_slope(s, d)
-    }
-}
+use super::operator::{Blend, Operator, Plain, RUN, Smooth, run_of};
 
 /// How a target is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -677,9 +584,6 @@ fn synthesized_byte(s: f32) -> u8 {
     (s * 254.0 + 1.5) as u8
 }
 
-/// Texels solved at a time: loops of known length are what compilers vectorise.
-pub(crate) const RUN: usize = 64;
-
 #[inline(always)]
 #[allow(
     clippy::needless_range_loop,
@@ -722,19 +626,6 @@ fn overlay_rows(
         }
         for (out, texel) in out.as_chunks_mut().0.iter_mut().zip(texels) {
             *out = texel.to_le_bytes();
-        }
-    }
-}
-
-/// A run from `x0` on; beyond the row's end there are zeros.
-#[inline(always)]
-pub(crate) fn run_of(row: &[f32], x0: usize) -> [f32; RUN] {
-    match row[x0..].first_chunk() {
-        Some(run) => *run,
-        None => {
-            let mut run = [0.0; RUN];
-            run[..row.len() - x0].copy_from_slice(&row[x0..]);
-            run
         }
     }
 }

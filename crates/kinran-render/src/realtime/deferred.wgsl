@@ -60,7 +60,7 @@ fn light(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
         if light.color.w > 0.5 {
             visible = shadow(surface.position, surface.geometric_normal, incoming.direction);
         }
-        let reflected = (lobe.diffuse / PI + specular_isotropic(surface, lobe, u)) * u.z;
+        let reflected = (diffuse_lobe(lobe.diffuse) + specular_isotropic(surface, lobe, u)) * u.z;
         let lit = select(vec3f(0.0), reflected, u.z > 0.0);
         sum += fuzz_over(surface.fuzz, incoming.direction, lit, lobe.diffuse) * incoming.irradiance * visible;
     }

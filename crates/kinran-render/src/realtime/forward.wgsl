@@ -33,7 +33,7 @@ fn lit(surface: Surface, lobe: Lobe, skin: Skin) -> vec3f {
             if u.z > 0.0 && direct > 0.0 {
                 gloss = skin_gloss(surface, lobe, u) * u.z;
             }
-            let diffuse = lobe.diffuse / PI * scattered;
+            let diffuse = diffuse_lobe(lobe.diffuse) * scattered;
             sum += fuzz_over_skin(surface.fuzz, incoming.direction, diffuse, cosine, gloss, direct)
                 * incoming.irradiance;
             continue;
@@ -48,7 +48,7 @@ fn lit(surface: Surface, lobe: Lobe, skin: Skin) -> vec3f {
         if light.color.w > 0.5 {
             visible = shadow(surface.position, surface.geometric_normal, incoming.direction);
         }
-        let base = (lobe.diffuse / PI + specular_anisotropic(surface, lobe, u)) * u.z;
+        let base = (diffuse_lobe(lobe.diffuse) + specular_anisotropic(surface, lobe, u)) * u.z;
         let lit = select(vec3f(0.0), base, u.z > 0.0);
         sum += fuzz_over(surface.fuzz, incoming.direction, lit, lobe.diffuse) * incoming.irradiance * visible;
     }

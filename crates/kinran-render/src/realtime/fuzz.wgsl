@@ -52,7 +52,7 @@ fn fuzz_over(fuzz: Fuzz, u: vec3f, base: vec3f, diffuse: vec3f) -> vec3f {
     let u_v = dot(fuzz.v, u);
     if fuzz.kind == FUZZ_SIMPLE {
         let soft = fuzz.color * fuzz_deferred(n_u, fuzz.view.n_v, u_v, fuzz.view.escaped);
-        return base + fuzz.amount * (soft - diffuse * (max(n_u, 0.0) / PI));
+        return base + fuzz.amount * (soft - diffuse_lobe(diffuse) * max(n_u, 0.0));
     }
     if n_u <= 1e-4 {
         return vec3f(0.0);

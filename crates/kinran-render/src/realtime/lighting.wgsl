@@ -1,7 +1,8 @@
 // A surface in light. The model is the reference renderer's: GGX with multiscatter compensation over Lambert, which has
 // what the specular lobe leaves.
 
-const DIELECTRIC: f32 = 0.04;
+// Reflectance of a dielectric at normal incidence (glTF 2.0, appendix B).
+const DIELECTRIC_F0: f32 = 0.04;
 // Smallest cosine between shading normal and view.
 const N_V_MIN: f32 = 1e-3;
 
@@ -41,6 +42,12 @@ struct Lobe {
     transmitted: vec3f,
 }
 
+// What a surface of this albedo scatters of a light, per steradian, without the cosine: Lambert's lobe. So it is also what is
+// scattered of an irradiance.
+fn diffuse_lobe(albedo: vec3f) -> vec3f {
+    return albedo / PI;
+}
+
 // The part of the specular albedo that Schlick's (1 - v·h)^5 carries, from the reference renderer's table.
 fn grazing_albedo(n_v: f32, alpha: f32) -> f32 {
     let size = vec2f(textureDimensions(albedo_map));
@@ -53,12 +60,12 @@ fn lobe_of(surface: Surface, view: vec3f) -> Lobe {
     let alpha = ggx_albedo_alpha(v, surface.alpha_t, surface.alpha_b);
     let white = ggx_directional_albedo(v.z, alpha);
     let grazing = grazing_albedo(v.z, alpha);
-    let base_reflectance = mix(vec3f(DIELECTRIC), surface.base_color, surface.metallic);
+    let base_reflectance = mix(vec3f(DIELECTRIC_F0), surface.base_color, surface.metallic);
     let compensation = multiscatter_compensation(base_reflectance, v, surface.alpha_t, surface.alpha_b);
     let single = base_reflectance * (white - grazing) + grazing;
 
-    let dielectric = (DIELECTRIC * (white - grazing) + grazing)
-        * multiscatter_compensation(vec3f(DIELECTRIC), v, surface.alpha_t, surface.alpha_b).x;
+    let dielectric = (DIELECTRIC_F0 * (white - grazing) + grazing)
+        * multiscatter_compensation(vec3f(DIELECTRIC_F0), v, surface.alpha_t, surface.alpha_b).x;
     let inside = (1.0 - surface.metallic) * (1.0 - min(dielectric, 1.0));
     let scattered = inside * (1.0 - surface.transmissive);
     return Lobe(
@@ -124,7 +131,7 @@ fn from_behind(surface: Surface, lobe: Lobe, light: Light, incoming: Incident, n
     if light.color.w > 0.5 {
         visible = shadow(surface.position, -surface.geometric_normal, incoming.direction);
     }
-    return lobe.translucent / PI * incoming.irradiance * (-n_u * visible);
+    return diffuse_lobe(lobe.translucent) * incoming.irradiance * (-n_u * visible);
 }
 
 // Specular lobe times nothing: per steradian, without the cosine. `u` lies above the horizon.
@@ -159,9 +166,9 @@ fn ambient(surface: Surface, lobe: Lobe) -> vec3f {
     for (var i = 0; i < 9; i++) {
         coefficients[i] = frame.irradiance[i].rgb;
     }
-    var diffuse = lobe.diffuse / PI * max(sh_evaluate(coefficients, surface.normal), vec3f(0.0));
+    var diffuse = diffuse_lobe(lobe.diffuse) * max(sh_evaluate(coefficients, surface.normal), vec3f(0.0));
     if any(lobe.translucent > vec3f(0.0)) {
-        diffuse += lobe.translucent / PI * max(sh_evaluate(coefficients, -surface.normal), vec3f(0.0));
+        diffuse += diffuse_lobe(lobe.translucent) * max(sh_evaluate(coefficients, -surface.normal), vec3f(0.0));
     }
     if frame.camera.w == 0.0 {
         return surface.occlusion * diffuse;

@@ -1,5 +1,6 @@
 //! What a renderer draws into.
 
+use super::device::read_back;
 use super::{DEPTH, G_BUFFER, Gpu, HDR, Realtime, SUM, Timer, color_attachment, depth_attachment};
 use crate::Error;
 use crate::reference::Film;
@@ -160,18 +161,4 @@ impl Target {
         let pixels = rows.flat_map(|row| row[..16 * width as usize].chunks_exact(16).map(pixel)).collect();
         Ok(Film { width, height, pixels })
     }
-}
-
-/// The bytes of a buffer that the device was told to fill, once it has.
-pub(super) fn read_back(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, Error> {
-    let failed =
-        |e: &dyn std::fmt::Display| Error::Gpu(format!("the device does not give back its results: {e}"));
-    let (sender, receiver) = std::sync::mpsc::channel();
-    buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-        // The receiver waits below.
-        let _ = sender.send(result);
-    });
-    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(&e))?;
-    receiver.recv().map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
-    Ok(buffer.slice(..).get_mapped_range().map_err(|e| failed(&e))?.to_vec())
 }

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::time::Duration;
 
-use super::{Gpu, target::read_back};
+use super::device::{Gpu, read_back};
 use crate::Error;
 
 /// More passes than a frame has.

@@ -10,11 +10,9 @@ use kinran_shading::detail::{
 };
 use kinran_shading::normal_from_xy;
 
+use super::bound::{BoundTexture, sample_bound};
 use super::geometry::SurfacePoint;
-use super::render::TextureFiltering;
-use super::scene::BoundTexture;
-use super::shading::sample_bound;
-use super::texture::MipTexture;
+use super::texture::{MipTexture, TextureFiltering};
 
 /// What of a blended map is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -11,10 +11,10 @@ use kinran_shading::fuzz::{
     fuzz_over_base_shares, fuzz_p_s, fuzz_passage, fuzz_smooth_normal, fuzz_view, velvet_k, velvet_phase,
 };
 
-use super::geometry::SurfacePoint;
-use super::render::TextureFiltering;
-use super::scene::BoundTexture;
-use super::shading::{N_V_MIN, sample, sample_bound};
+use super::bound::{BoundTexture, sample, sample_bound};
+use super::diffuse::diffuse_lobe;
+use super::geometry::{N_V_MIN, SurfacePoint};
+use super::texture::TextureFiltering;
 
 /// Coefficients for one tilt and spread, as the shader library's functions of these names take them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -204,8 +204,8 @@ impl FuzzAt {
         let phase = match self.kind {
             Kind::Simple { fuzziness, diffuse } => {
                 let soft = self.color * fuzz_deferred(u.z, self.view.n_v, u.dot(self.v), self.view.escaped);
-                let lambert = diffuse * (std::f32::consts::FRAC_1_PI * u.z.max(0.0));
-                return base + fuzziness * (soft - lambert);
+                let without = diffuse_lobe(diffuse) * u.z.max(0.0);
+                return base + fuzziness * (soft - without);
             }
             Kind::Layer { phase, .. } => phase,
         };

@@ -51,6 +51,9 @@ pub struct SurfacePoint {
     pub material: usize,
 }
 
+/// Smallest cosine between shading normal and view; chosen by eye, below it grazing lobes only alias.
+pub(crate) const N_V_MIN: f32 = 1e-3;
+
 /// The code of no curvature.
 pub const FLAT: Vec4 = Vec4::new(0.0, 128.0 / 255.0, 0.0, 0.0);
 

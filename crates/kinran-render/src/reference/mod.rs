@@ -6,9 +6,11 @@
 //! no light between surfaces.
 
 pub(crate) mod albedo;
+mod bound;
 mod bvh;
 mod camera;
 mod detail;
+mod diffuse;
 mod fuzz;
 mod geometry;
 mod light;
@@ -19,14 +21,13 @@ mod shading;
 mod skin;
 mod texture;
 
+pub use bound::BoundTexture;
 pub use bvh::{Bvh, Hit};
 pub use camera::{CameraRay, PictureCamera, frame_box, look_at};
 pub use detail::{DetailShown, RenderDetail, RenderDetailLayer};
 pub use fuzz::{FUZZ_TILTS, FuzzCoefficients, FuzzFits, RenderFuzz};
 pub use geometry::{FLAT, Geometry, MAX_TRIANGLES, SurfacePoint};
-pub use render::{Background, Film, Settings, TextureFiltering, render};
-pub use scene::{
-    AnisoEncoding, BoundTexture, RenderMaterial, RenderScene, SurfaceTextures, Surroundings, Translucency,
-};
+pub use render::{Background, Film, Settings, render};
+pub use scene::{AnisoEncoding, RenderMaterial, RenderScene, SurfaceTextures, Surroundings, Translucency};
 pub use skin::{RenderSkin, SkinCurvature, SkinTable, SkinTables};
-pub use texture::{MipLevel, MipTexture};
+pub use texture::{MipLevel, MipTexture, TextureFiltering};

@@ -3,6 +3,7 @@
 use super::{
     Hit, PictureCamera, RenderFuzz, RenderScene,
     camera::CameraRay,
+    diffuse::diffuse_lobe,
     fuzz::FuzzAt,
     geometry::SurfacePoint,
     light::{Incident, incident},
@@ -10,6 +11,7 @@ use super::{
     scene::{RenderMaterial, Surroundings},
     shading::{Shading, shadow_transmittance},
     skin::{RenderSkin, SkinPoint},
+    texture::TextureFiltering,
 };
 use crate::Error;
 use glam::{Vec2, Vec3};
@@ -17,21 +19,8 @@ use kinran_scene::{AlphaMode, Camera};
 use kinran_shading::fuzz::{fuzz_over_base_pdf, fuzz_over_base_sample};
 use kinran_shading::{ggx_vndf_pdf, ggx_vndf_sample, m_n};
 use rayon::prelude::*;
-use std::f32::consts::{FRAC_1_PI, TAU};
+use std::f32::consts::TAU;
 use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// How textures are read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum TextureFiltering {
-    /// As a GPU does, once per sample with the footprint of a whole pixel: trilinear, along up to
-    /// `max_anisotropy` (1 to 16) places of the longer axis.
-    Mips {
-        /// 1 is plain trilinear filtering.
-        max_anisotropy: u32,
-    },
-    /// Bilinear from level 0, the pixel's many samples being the filter: ground truth.
-    Level0,
-}
 
 /// What the camera sees where there is no surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -328,9 +317,9 @@ impl Renderer<'_> {
                 }
                 return sum + shading.occlusion * self.environment_through(&base, fuzz, surroundings, sample);
             }
-            let mut diffuse = shading.diffuse * FRAC_1_PI * irradiance;
+            let mut diffuse = diffuse_lobe(shading.diffuse) * irradiance;
             if shading.translucent != Vec3::ZERO {
-                diffuse += shading.translucent * FRAC_1_PI * surroundings.irradiance(-n);
+                diffuse += diffuse_lobe(shading.translucent) * surroundings.irradiance(-n);
             }
             let specular = self.environment_specular(shading, surroundings, sample);
             sum += shading.occlusion * (diffuse + specular);

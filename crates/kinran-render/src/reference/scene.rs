@@ -1,8 +1,10 @@
 //! A scene as the renderer needs it.
 
-use super::{FuzzFits, Geometry, MipTexture, RenderDetail, RenderDetailLayer, RenderFuzz, RenderSkin};
+use super::{
+    BoundTexture, FuzzFits, Geometry, MipTexture, RenderDetail, RenderDetailLayer, RenderFuzz, RenderSkin,
+};
 use crate::Error;
-use glam::{Mat3, Vec2, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 use kinran_image::{Channels, Image, Pixels, Texture, Transfer};
 use kinran_scene::{
     AlphaMode, Detail, DetailMap, Environment, Fuzz, FuzzDirection, FuzzLayer, FuzzPhase, Light, Material,
@@ -12,17 +14,6 @@ use kinran_shading::fuzz::fibre_direction;
 use kinran_shading::sh::{Sh9, sh_convolve_cosine, sh_evaluate};
 use kinran_shading::skin::lighting::skin_irradiance;
 use std::{borrow::Cow, collections::HashMap, sync::Arc};
-
-/// A texture in its place on a mesh.
-#[derive(Clone, Debug)]
-pub struct BoundTexture {
-    /// The texels.
-    pub texture: Arc<MipTexture>,
-    /// Which of the mesh's UV sets: 0 or 1.
-    pub uv_set: usize,
-    /// Maps the mesh's UV to the texture's.
-    pub transform: Mat3,
-}
 
 /// Normals and roughness of a surface. Which filter made their mips is not the renderer's business.
 #[derive(Clone, Debug)]
@@ -190,30 +181,6 @@ impl RenderScene {
                 fuzz.fits = Some(fit(layer.phase, layer.spread));
             }
         }
-    }
-}
-
-impl BoundTexture {
-    /// A texture that is `texel` everywhere.
-    pub fn constant(texel: [f32; 4]) -> Self {
-        BoundTexture { texture: Arc::new(MipTexture::constant(texel)), uv_set: 0, transform: Mat3::IDENTITY }
-    }
-
-    /// A texture in the place of a glTF texture.
-    pub fn new(texture: Arc<MipTexture>, place: &TextureRef) -> Self {
-        BoundTexture { texture, uv_set: place.uv_set, transform: place.transform }
-    }
-
-    /// The texture's coordinates from the mesh's.
-    #[inline]
-    pub fn uv(&self, uv: [Vec2; 2]) -> Vec2 {
-        self.transform.transform_point2(uv[self.uv_set])
-    }
-
-    /// The texture's coordinates' change from the mesh's.
-    #[inline]
-    pub fn uv_change(&self, change: [Vec2; 2]) -> Vec2 {
-        self.transform.transform_vector2(change[self.uv_set])
     }
 }
 

@@ -7,11 +7,13 @@
 
 use super::{
     albedo::specular_albedo,
+    bound::{sample, sample_bound},
+    diffuse::diffuse_lobe,
     fuzz::FuzzAt,
-    geometry::SurfacePoint,
-    render::TextureFiltering,
-    scene::{AnisoEncoding, BoundTexture, RenderMaterial},
+    geometry::{N_V_MIN, SurfacePoint},
+    scene::{AnisoEncoding, RenderMaterial},
     skin::SkinPoint,
+    texture::TextureFiltering,
 };
 use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, Vec4, Vec4Swizzles};
 use kinran_scene::{AlphaMode, DetailMap};
@@ -20,13 +22,9 @@ use kinran_shading::{
     axis_from_direction, ggx_aniso_d, ggx_d, m_n, multiscatter_compensation, normal_from_xy, schlick_f,
     smith_aniso_v, smith_v,
 };
-use std::f32::consts::FRAC_1_PI;
 
 /// Reflectance of a dielectric at normal incidence (glTF 2.0, appendix B).
 const DIELECTRIC_F0: f32 = 0.04;
-
-/// Smallest cosine between shading normal and view; chosen by eye, below it grazing lobes only alias.
-pub(crate) const N_V_MIN: f32 = 1e-3;
 
 /// A material evaluated for one point and one view.
 #[derive(Clone, Copy, Debug)]
@@ -54,28 +52,6 @@ pub(crate) struct Shading {
     pub(crate) skin: Option<SkinPoint>,
     /// Fibres over all that.
     pub(crate) fuzz: Option<FuzzAt>,
-}
-
-/// A texture at a point as `filtering` says; white where there is none.
-#[inline]
-pub(crate) fn sample(
-    texture: &Option<BoundTexture>,
-    point: &SurfacePoint,
-    filtering: TextureFiltering,
-) -> Vec4 {
-    texture.as_ref().map_or(Vec4::ONE, |t| sample_bound(t, point, filtering))
-}
-
-#[inline]
-pub(crate) fn sample_bound(t: &BoundTexture, point: &SurfacePoint, filtering: TextureFiltering) -> Vec4 {
-    let uv = t.uv(point.uv);
-    match filtering {
-        TextureFiltering::Level0 => t.texture.sample_level(uv, 0),
-        TextureFiltering::Mips { max_anisotropy } => {
-            let (dx, dy) = (t.uv_change(point.uv_dx), t.uv_change(point.uv_dy));
-            t.texture.sample_grad(uv, dx, dy, max_anisotropy)
-        }
-    }
 }
 
 /// Base colour and alpha.
@@ -228,20 +204,20 @@ impl Shading {
     /// of light from the front, what comes through of light from behind.
     #[inline]
     pub(crate) fn scattered(&self, u: Vec3) -> Vec3 {
-        self.reflected(u) + self.translucent * (FRAC_1_PI * (-u.z).max(0.0))
+        self.reflected(u) + diffuse_lobe(self.translucent) * (-u.z).max(0.0)
     }
 
     /// Of it what is reflected, through the fuzz if there is any.
     #[inline]
     pub(crate) fn reflected(&self, u: Vec3) -> Vec3 {
-        let base = (self.diffuse * FRAC_1_PI + self.specular(u)) * u.z.max(0.0);
+        let base = (diffuse_lobe(self.diffuse) + self.specular(u)) * u.z.max(0.0);
         self.fuzz.as_ref().map_or(base, |fuzz| fuzz.over(u, base))
     }
 
     /// What skin reflects of a light along `u`, BRDF times cosine, through the fuzz if there is any: `cosine` is what scatters,
     /// times π, `direct` the share of the light that is not in shadow, `scattered` of it what scatters into shadows.
     pub(crate) fn of_skin(&self, u: Vec3, cosine: Vec3, direct: Vec3, scattered: Vec3) -> Vec3 {
-        let diffuse = self.diffuse * FRAC_1_PI * scattered;
+        let diffuse = diffuse_lobe(self.diffuse) * scattered;
         let gloss = self.specular(u) * u.z.max(0.0);
         match &self.fuzz {
             None => diffuse * cosine + gloss * direct,

@@ -5,9 +5,23 @@
 //! corner of the first texel.
 
 use glam::{Vec2, Vec4, vec2};
+use kinran_image::srgb::linear_of_codes;
 use kinran_image::{Image, Texture, Transfer};
 use kinran_scene::Wrap;
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
+
+/// How textures are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum TextureFiltering {
+    /// As a GPU does, once per sample with the footprint of a whole pixel: trilinear, along up to
+    /// `max_anisotropy` (1 to 16) places of the longer axis.
+    Mips {
+        /// 1 is plain trilinear filtering.
+        max_anisotropy: u32,
+    },
+    /// Bilinear from level 0, the pixel's many samples being the filter: ground truth.
+    Level0,
+}
 
 /// One level of a [`MipTexture`].
 #[derive(Clone, Debug, PartialEq)]
@@ -138,18 +152,9 @@ impl MipTexture {
     }
 }
 
-/// Linear light of every 16-bit sRGB code (IEC 61966-2-1); 8-bit codes are every 257th of them.
-static SRGB_EOTF: LazyLock<Vec<f32>> = LazyLock::new(|| {
-    let decode = |code: u16| {
-        let x = f32::from(code) / 65535.0;
-        if x <= 0.04045 { x / 12.92 } else { libm::powf((x + 0.055) / 1.055, 2.4) }
-    };
-    (0..=u16::MAX).map(decode).collect()
-});
-
 /// Decodes sRGB-encoded colour in place; alpha stays.
 fn linearize(texels: &mut [[f32; 4]]) {
-    let table = &*SRGB_EOTF;
+    let table = linear_of_codes();
     for texel in texels {
         for c in &mut texel[..3] {
             *c = table[(*c * 65535.0 + 0.5) as u16 as usize];

@@ -15,5 +15,7 @@ pub mod lighting;
 pub mod penumbra;
 pub mod profile;
 pub mod ring;
+mod row;
 pub mod sampled;
+mod samples;
 pub mod sphere;

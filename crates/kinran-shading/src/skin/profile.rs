@@ -10,7 +10,7 @@
 //! red, green and blue spread.
 
 use super::bessel::k0;
-use super::sampled::{self, Sample};
+use super::samples::{self, Sample};
 use core::f64::consts::PI;
 use libm::{exp, log, pow, sqrt};
 
@@ -251,7 +251,7 @@ impl<'a> LinearProfile<'a> {
                 }
                 sum
             }
-            Shape::Sampled(samples) => sampled::density(samples, x),
+            Shape::Sampled(samples) => samples::density(samples, x),
         }
     }
 

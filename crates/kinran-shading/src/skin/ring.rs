@@ -10,7 +10,9 @@
 
 use super::bessel::{scaled_i0, scaled_i1};
 use super::profile::{Gaussian, LinearProfile, Shape};
-use super::sampled::sampled_row;
+pub use super::row::column_n_u;
+use super::row::{Half, Integrals, Ring, walk};
+use super::sampled::SampledRing;
 use core::f64::consts::PI;
 use libm::{asin, cos, exp, sin, sqrt};
 
@@ -33,11 +35,6 @@ const SINE_UNTIL: f64 = 2.0 * PI / 3.0;
 /// Below this curvature (1/mm; a radius of a kilometre) a surface is flat.
 const FLAT: f64 = 1e-6;
 
-/// n·u at the middle of each of `columns` equal columns from -1 to 1.
-pub fn column_n_u(column: usize, columns: usize) -> f64 {
-    (2 * column + 1) as f64 / columns as f64 - 1.0
-}
-
 impl LinearProfile<'_> {
     /// Fills a row of the table of punctual light: at [`column_n_u`] of each entry, what part of the light's
     /// irradiance at normal incidence leaves again, RGB, on a cylinder of `curvature` (1/mm, below zero counts as zero)
@@ -54,60 +51,44 @@ impl LinearProfile<'_> {
         row.fill([0.0; 3]);
         match self.0 {
             Shape::Gaussians(sum) => gaussian_row(sum, curvature.recip(), row),
-            Shape::Sampled(samples) => sampled_row(samples, curvature.recip(), row),
-            Shape::Burley(_) | Shape::Table(_) => self.quadrature_row(curvature.recip(), row),
-        }
-    }
-
-    /// The same by quadrature of any density.
-    fn quadrature_row(&self, r: f64, row: &mut [[f64; 3]]) {
-        let columns = row.len();
-        let lit = columns / 2..columns;
-        let mut cumulative =
-            Cumulative { profile: self, r, at: 0.0, one: [0.0; 3], cos: [0.0; 3], sin: [0.0; 3] };
-
-        // A and B are differences of integrals from 0: those up to π/2 - θ first, then those up to π/2 + θ.
-        for i in lit.clone() {
-            let x = column_n_u(i, columns).max(0.0);
-            let angle = asin(x);
-            cumulative.advance(angle);
-            for c in [0, 1, 2] {
-                row[i][c] = x * cumulative.cos[c] - cos(angle) * cumulative.sin[c];
-            }
-        }
-        for i in lit.clone().rev() {
-            let x = column_n_u(i, columns).max(0.0);
-            let angle = asin(x);
-            cumulative.advance(PI - angle);
-            for c in [0, 1, 2] {
-                row[i][c] += x * cumulative.cos[c] + cos(angle) * cumulative.sin[c];
-            }
-        }
-        cumulative.advance(PI);
-
-        // The clamped cosine is half of cosine and its absolute value; the first turns its sign behind the terminator.
-        for i in lit {
-            let x = column_n_u(i, columns);
-            for c in [0, 1, 2] {
-                row[i][c] /= 2.0 * cumulative.one[c];
-                row[columns - 1 - i][c] = row[i][c] - x * cumulative.cos[c] / cumulative.one[c];
+            Shape::Sampled(samples) => walk(&mut SampledRing::new(samples, curvature.recip()), row),
+            Shape::Burley(_) | Shape::Table(_) => {
+                walk(&mut QuadratureRing::new(self, curvature.recip()), row)
             }
         }
     }
 }
 
-/// Integrals of the density, and of it times cosine and sine, from 0 up to an angle.
-struct Cumulative<'a, 'b> {
+/// The ring of any density, by quadrature.
+struct QuadratureRing<'a, 'b> {
     profile: &'a LinearProfile<'b>,
     r: f64,
     at: f64,
-    one: [f64; 3],
-    cos: [f64; 3],
-    sin: [f64; 3],
+    integrals: Integrals,
 }
 
-impl Cumulative<'_, '_> {
-    fn advance(&mut self, to: f64) {
+impl Ring for QuadratureRing<'_, '_> {
+    fn advance(&mut self, sine: f64, half: Half) -> f64 {
+        let angle = asin(sine);
+        self.go_on(match half {
+            Half::Near => angle,
+            Half::Far => PI - angle,
+        });
+        cos(angle)
+    }
+
+    fn integrals(&self) -> Integrals {
+        self.integrals
+    }
+}
+
+impl<'a, 'b> QuadratureRing<'a, 'b> {
+    fn new(profile: &'a LinearProfile<'b>, r: f64) -> Self {
+        QuadratureRing { profile, r, at: 0.0, integrals: Integrals::default() }
+    }
+
+    /// Goes on to an angle in radians.
+    fn go_on(&mut self, to: f64) {
         let shortest = self.profile.shortest() / self.r;
         let end = {
             // Chords beyond the reach, the whole circle where the reach goes round it.
@@ -156,9 +137,9 @@ impl Cumulative<'_, '_> {
         let (sin, cos) = (2.0 * s * sqrt(1.0 - s * s), 1.0 - 2.0 * s * s);
         for (c, density) in density.into_iter().enumerate() {
             let mass = angle * density;
-            self.one[c] += mass;
-            self.cos[c] += mass * cos;
-            self.sin[c] += mass * sin;
+            self.integrals.one[c] += mass;
+            self.integrals.cos[c] += mass * cos;
+            self.integrals.sin[c] += mass * sin;
         }
     }
 }

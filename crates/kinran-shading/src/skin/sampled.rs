@@ -2,21 +2,10 @@
 //! rows is done once, and a ring reads differences of integrals in place of densities.
 
 use super::profile::{LinearProfile, Shape};
-use super::ring::column_n_u;
+use super::row::{Half, Integrals, Ring};
+pub use super::samples::Sample;
+use super::samples::cubic;
 use libm::{ceil, sqrt};
-
-/// A linear profile at a distance, RGB. Between samples the density is a straight line.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sample {
-    /// Millimetres.
-    pub(crate) distance: f64,
-    /// Per millimetre.
-    density: [f64; 3],
-    /// The density integrated from distance zero.
-    mass: [f64; 3],
-    /// The density times the distance, integrated likewise.
-    moment: [f64; 3],
-}
 
 /// The density of every so many samples is the table's; those between lie on cubics through four such.
 const EXACT_EVERY: usize = 4;
@@ -88,92 +77,12 @@ impl<'a> LinearProfile<'a> {
     }
 }
 
-/// Weights of the values at 0, 1, 2 and 3 in the cubic through them (Lagrange).
-fn cubic(x: f64) -> [f64; 4] {
-    let (a, b, c) = (x - 1.0, x - 2.0, x - 3.0);
-    [a * b * c / -6.0, 0.5 * x * b * c, -0.5 * x * a * c, x * a * b / 6.0]
-}
-
-impl Sample {
-    /// Mass and moment up to a distance between this sample and the next.
-    fn integrals(&self, next: &Sample, distance: f64) -> ([f64; 3], [f64; 3]) {
-        let x = distance - self.distance;
-        let t = x / (next.distance - self.distance);
-        let (mut mass, mut moment) = (self.mass, self.moment);
-        for c in [0, 1, 2] {
-            let rise = t * (next.density[c] - self.density[c]);
-            let of_mass = x * (self.density[c] + 0.5 * rise);
-            mass[c] += of_mass;
-            moment[c] += self.distance * of_mass + x * x * (0.5 * self.density[c] + rise / 3.0);
-        }
-        (mass, moment)
-    }
-}
-
-/// Density at a distance in millimetres.
-pub(crate) fn density(samples: &[Sample], x: f64) -> [f64; 3] {
-    let next = samples.partition_point(|sample| sample.distance <= x);
-    if next == samples.len() {
-        return [0.0; 3];
-    }
-    let (a, b) = (&samples[next - 1], &samples[next]);
-    let t = (x - a.distance) / (b.distance - a.distance);
-    core::array::from_fn(|c| a.density[c] + t * (b.density[c] - a.density[c]))
-}
-
-/// A row of the ring, [`LinearProfile::ring_row`], for a radius `r` in millimetres.
+/// The ring of a sampled profile, for a radius `r` in millimetres.
 ///
 /// Along the chord x = 2 r s, where s is the sine of half the angle, `∫ R sin θ dθ` is the moment over r² exactly. The weight
 /// of `∫ R cos θ dθ` depends on s alone: on each piece it is a straight line with the weight's own mean and its slope in the
 /// middle, under which the profile's mass and moment are all that is needed. The same holds for `∫ R dθ`.
-pub(crate) fn sampled_row(samples: &[Sample], r: f64, row: &mut [[f64; 3]]) {
-    let columns = row.len();
-    let lit = columns / 2..columns;
-    let mut arc = Arc {
-        samples,
-        r,
-        half: (0.0, 1.0),
-        passed: 0,
-        mass: [0.0; 3],
-        moment: [0.0; 3],
-        one: [0.0; 3],
-        cos: [0.0; 3],
-    };
-
-    // Differences of integrals from 0: those up to π/2 - θ first, then those up to π/2 + θ.
-    for i in lit.clone() {
-        let x = column_n_u(i, columns).max(0.0);
-        let cos = sqrt(1.0 - x * x);
-        // Of half the angle, the sine without losing digits near zero.
-        let half_cos = sqrt(0.5 * (1.0 + cos));
-        arc.advance((0.5 * x / half_cos, half_cos));
-        for c in [0, 1, 2] {
-            row[i][c] = x * arc.cos[c] - cos * arc.moment[c] / (r * r);
-        }
-    }
-    for i in lit.clone().rev() {
-        let x = column_n_u(i, columns).max(0.0);
-        let cos = sqrt(1.0 - x * x);
-        let half_sin = sqrt(0.5 * (1.0 + cos));
-        arc.advance((half_sin, 0.5 * x / half_sin));
-        for c in [0, 1, 2] {
-            row[i][c] += x * arc.cos[c] + cos * arc.moment[c] / (r * r);
-        }
-    }
-    arc.advance((1.0, 0.0));
-
-    // The clamped cosine is half of cosine and its absolute value; the first turns its sign behind the terminator.
-    for i in lit {
-        let x = column_n_u(i, columns);
-        for c in [0, 1, 2] {
-            row[i][c] /= 2.0 * arc.one[c];
-            row[columns - 1 - i][c] = (row[i][c] - x * arc.cos[c] / arc.one[c]).max(0.0);
-        }
-    }
-}
-
-/// What a profile leaves along a ring from the light's side up to an angle.
-struct Arc<'a> {
+pub(super) struct SampledRing<'a> {
     samples: &'a [Sample],
     r: f64,
     /// Sine and cosine of half the angle.
@@ -188,9 +97,34 @@ struct Arc<'a> {
     cos: [f64; 3],
 }
 
-impl Arc<'_> {
+impl Ring for SampledRing<'_> {
+    fn advance(&mut self, sine: f64, half: Half) -> f64 {
+        let cos = sqrt(1.0 - sine * sine);
+        // Of half the angle, the smaller of sine and cosine from the product: near zero no digits are lost.
+        let large = sqrt(0.5 * (1.0 + cos));
+        let small = 0.5 * sine / large;
+        self.go_on(match half {
+            Half::Near => (small, large),
+            Half::Far => (large, small),
+        });
+        cos
+    }
+
+    fn integrals(&self) -> Integrals {
+        let square = self.r * self.r;
+        Integrals { one: self.one, cos: self.cos, sin: self.moment.map(|moment| moment / square) }
+    }
+}
+
+impl<'a> SampledRing<'a> {
+    pub(super) fn new(samples: &'a [Sample], r: f64) -> Self {
+        let nothing = [0.0; 3];
+        let (mass, moment, one, cos) = (nothing, nothing, nothing, nothing);
+        SampledRing { samples, r, half: (0.0, 1.0), passed: 0, mass, moment, one, cos }
+    }
+
     /// Goes on to the angle whose half has this sine and cosine.
-    fn advance(&mut self, to: (f64, f64)) {
+    fn go_on(&mut self, to: (f64, f64)) {
         let end = {
             let sine = 0.5 * self.samples[self.samples.len() - 1].distance / self.r;
             if to.0 < sine { to } else { (sine, sqrt(1.0 - sine * sine)) }

@@ -1,0 +1,71 @@
+//! How texels are stored, and what their numbers mean.
+
+/// The layout of a texture's bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Format {
+    /// 4 bits a texel, RGB.
+    Bc1,
+    /// 4 bits a texel, R.
+    Bc4,
+    /// 8 bits a texel, RG.
+    Bc5,
+    /// 8 bits a texel, RGBA.
+    Bc7,
+    /// One byte a channel.
+    Rgba8,
+    /// One half float a channel.
+    Rgba16F,
+}
+
+impl Format {
+    /// Texels along a side of the unit the bytes come in: 4 for block formats, 1 for the others.
+    pub fn block_side(self) -> u32 {
+        match self {
+            Format::Bc1 | Format::Bc4 | Format::Bc5 | Format::Bc7 => 4,
+            Format::Rgba8 | Format::Rgba16F => 1,
+        }
+    }
+
+    /// Bytes of one block, or of one texel in formats without blocks.
+    pub fn block_bytes(self) -> usize {
+        match self {
+            Format::Rgba8 => 4,
+            Format::Bc1 | Format::Bc4 | Format::Rgba16F => 8,
+            Format::Bc5 | Format::Bc7 => 16,
+        }
+    }
+
+    /// Bytes of a level of `width` x `height` texels, blocks at the edges counted whole.
+    pub fn level_bytes(self, width: u32, height: u32) -> usize {
+        let side = self.block_side();
+        width.div_ceil(side) as usize * height.div_ceil(side) as usize * self.block_bytes()
+    }
+
+    /// Whether the GPU can linearise this format's colour while sampling.
+    pub fn has_srgb(self) -> bool {
+        matches!(self, Format::Bc1 | Format::Bc7 | Format::Rgba8)
+    }
+}
+
+/// What a colour channel's numbers mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Transfer {
+    /// Numbers are used as they are: normals, roughness, aniso, masks, HDR colour.
+    Linear,
+    /// sRGB-encoded colour, linearised by the sampler.
+    Srgb,
+    /// The file does not say it: colour is sRGB, all else linear. In textures only of DDS files that are older than
+    /// DirectX 10 or typeless; none is written so.
+    Unsaid,
+}
+
+impl Transfer {
+    /// What it is for colour (`color`) or anything else.
+    pub fn of_content(self, color: bool) -> Transfer {
+        match self {
+            Transfer::Unsaid if color => Transfer::Srgb,
+            Transfer::Unsaid => Transfer::Linear,
+            said => said,
+        }
+    }
+}
