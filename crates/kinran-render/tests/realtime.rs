@@ -3,11 +3,14 @@
 use glam::{Affine3A, Vec3, Vec4, vec2, vec3};
 use kinran_image::{Encoder, Encoding, Format, Level, Preset, Texture, Transfer, encode};
 use kinran_render::Error;
-use kinran_render::realtime::{Channel, Gpu, MAX_LIGHTS, Realtime, Settings, ShaderSource, Target, left_out};
+use kinran_render::realtime::{
+    Channel, Gpu, GpuScene, MAX_LIGHTS, Realtime, Settings, ShaderSource, Target, left_out,
+};
 use kinran_render::reference::{
     self, AnisoEncoding, Background, BoundTexture, Film, MipLevel, MipTexture, RenderScene, SurfaceTextures,
     TextureFiltering, Translucency, look_at, render,
 };
+use kinran_render::tonemap::{Tonemap, to_srgb8};
 use kinran_scene::{AlphaMode, Camera, Environment, Instance, Light, LightKind, Scene, Wrap};
 use kinran_shading::{aniso_encode, aniso_from_alphas, axis_from_direction};
 use std::f32::consts::PI;
@@ -16,7 +19,7 @@ use std::sync::{Arc, LazyLock, Mutex};
 mod shapes;
 use shapes::{directional, material, scene, sphere, square};
 
-/// One renderer for all tests, one test at a time: a frame's uniforms are the renderer's.
+/// One renderer for all tests, one test at a time: a software device has all cores to itself.
 static RENDERER: LazyLock<Mutex<Realtime>> = LazyLock::new(|| {
     // Blocks are read on a software device too, slow as it is.
     let features = wgpu::Features::TEXTURE_COMPRESSION_BC | wgpu::Features::TIMESTAMP_QUERY;
@@ -648,4 +651,77 @@ fn anisotropy_as_khronos_has_it_is_that_of_a_texel_on_both_renderers() {
         // Rounding of half floats in the picture's sum, and of the encoded square roots.
         assert!(brightest > 0.1 && worst < 2e-3 * brightest, "{name}: {worst} of {brightest} apart");
     }
+}
+
+/// A light from above and a sheet over the floor, or no sheet; then the same from a scene of another size, whose shadow map
+/// covers another space. Pictures drawn in turn by one renderer are those of fresh ones.
+#[test]
+fn a_scene_sees_the_shadows_or_the_exposure_of_another() {
+    let shaded = sheet_over_floor(vec3(0.0, 0.0, -1.0));
+    let lit = lit_square(vec![directional(vec3(0.0, 0.6, -0.8), 1.0)]);
+    let shot = Shot::new(vec3(0.0, -3.0, 0.6), 0.5);
+    let settings = Settings { shadows: true, tonemap: Tonemap::None, ..shot.settings };
+    let cases = [(&shaded, settings), (&lit, Settings { exposure: 1.5, ..settings })];
+    let size = (16, 16);
+    with_renderer(|renderer| {
+        let mut drawn = cases.map(|(scene, settings)| {
+            let loaded = renderer.load(scene, &renderer.light_of(scene), TRILINEAR);
+            (loaded, settings, Target::new(renderer, size))
+        });
+        for _ in 0..4 {
+            for (scene, settings, target) in &mut drawn {
+                renderer.draw(scene, &shot.camera, settings, target);
+            }
+        }
+        for (i, (scene, settings, target)) in drawn.iter().enumerate() {
+            let fresh =
+                Realtime::new(renderer.gpu(), &ShaderSource::default(), wgpu::TextureFormat::Rgba8Unorm)
+                    .unwrap();
+            let wanted = fresh.film(scene, &shot.camera, settings, size, 4, &|_, _| {}).unwrap();
+            let got = target.film(renderer.gpu()).unwrap();
+            assert_eq!(got, wanted, "the film of scene {i}");
+            let wanted = to_srgb8(&wanted.pixels, settings.exposure, settings.tonemap);
+            let got = shown(renderer, scene, target);
+            let apart = |(a, b): (&[u8; 3], &[u8; 3])| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap();
+            let worst = got.iter().zip(&wanted).map(apart).max().unwrap();
+            assert!(worst <= 1, "scene {i} is shown up to {worst} codes off");
+        }
+    });
+}
+
+/// The picture that a window would show.
+fn shown(renderer: &Realtime, scene: &GpuScene, target: &Target) -> Vec<[u8; 3]> {
+    let (device, queue) = (&renderer.gpu().device, &renderer.gpu().queue);
+    let (width, height) = target.size;
+    let window = device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba8Unorm,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    });
+    renderer.show(target, &window.create_view(&wgpu::TextureViewDescriptor::default()), scene);
+    let row = (4 * width).next_multiple_of(256);
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: u64::from(row * height),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None };
+    encoder.copy_texture_to_buffer(
+        window.as_image_copy(),
+        wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
+        window.size(),
+    );
+    queue.submit([encoder.finish()]);
+    buffer.slice(..).map_async(wgpu::MapMode::Read, |result| result.unwrap());
+    device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+    let bytes = buffer.slice(..).get_mapped_range().unwrap().to_vec();
+    let pixels = bytes.chunks_exact(row as usize).flat_map(|row| row[..4 * width as usize].chunks_exact(4));
+    pixels.map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
 }

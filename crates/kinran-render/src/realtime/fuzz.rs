@@ -1,19 +1,29 @@
 //! The uniform and textures of a material's fuzz.
 
-use glam::{Mat3, Vec3};
+use encase::ShaderType;
+use glam::Vec3;
 use half::f16;
 use kinran_scene::{Fuzz, FuzzAttenuation, FuzzPhase};
 use kinran_shading::fuzz::{FUZZ_TABLE_SIZE, fibre_direction, fuzz_alpha};
 
 use super::Gpu;
+use super::layouts::FUZZ_SLOTS;
+use super::uniform::{Vec4f, Vec4u, transforms};
 use crate::reference::{BoundTexture, FUZZ_TILTS, RenderFuzz, RenderMaterial};
 
-/// Floats of the uniform that fuzz_surface.wgsl declares.
-const FLOATS: usize = 4 * (4 + 5 * FUZZ_TILTS + 6);
+#[derive(ShaderType)]
+pub(super) struct FuzzMaterial {
+    flags: Vec4u,
+    factors: Vec4f,
+    color: Vec4f,
+    direction: Vec4f,
+    coefficients: [Vec4f; 5 * FUZZ_TILTS],
+    transforms: [Vec4f; 2 * FUZZ_SLOTS],
+}
 
 /// Direction, colour and amount, `white` where there is none.
-pub(super) fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTexture; 3] {
-    let Some(fuzz) = &m.fuzz else { return [white; 3] };
+pub(super) fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTexture; FUZZ_SLOTS] {
+    let Some(fuzz) = &m.fuzz else { return [white; FUZZ_SLOTS] };
     [&fuzz.direction, &fuzz.color, &fuzz.amount].map(|slot| slot.as_ref().unwrap_or(white))
 }
 
@@ -26,34 +36,26 @@ pub(super) fn is_forward(m: &RenderMaterial) -> bool {
 ///
 /// # Panics
 /// Where a layer has no coefficients.
-pub(super) fn floats(m: &RenderMaterial) -> Vec<f32> {
-    let mut floats = match &m.fuzz {
-        None => vec![0.0; 4 * (4 + 5 * FUZZ_TILTS)],
-        Some(fuzz) => of_fuzz(fuzz),
+pub(super) fn uniform(m: &RenderMaterial) -> FuzzMaterial {
+    let none = FuzzMaterial {
+        flags: [0; 4].into(),
+        factors: Vec4f::default(),
+        color: Vec4f::default(),
+        direction: Vec4f::default(),
+        coefficients: [Vec4f::default(); 5 * FUZZ_TILTS],
+        transforms: transforms(&slots(m, &BoundTexture::constant([1.0; 4]))),
     };
-    for slot in slots(m, &BoundTexture::constant([1.0; 4])) {
-        let Mat3 { x_axis, y_axis, z_axis } = slot.transform;
-        floats.extend([x_axis.x, y_axis.x, z_axis.x, slot.uv_set as f32]);
-        floats.extend([x_axis.y, y_axis.y, z_axis.y, 0.0]);
-    }
-    debug_assert_eq!(floats.len(), FLOATS);
-    floats
-}
-
-fn of_fuzz(fuzz: &RenderFuzz) -> Vec<f32> {
-    let head = |flags: [u32; 4], factors: [f32; 4], color: Vec3, direction: Vec3| {
-        let mut floats = flags.map(f32::from_bits).to_vec();
-        floats.extend(factors);
-        floats.extend(color.extend(0.0).to_array());
-        floats.extend(direction.extend(0.0).to_array());
-        floats
-    };
+    let Some(fuzz) = &m.fuzz else { return none };
     let layer = match &fuzz.fuzz {
         Fuzz::Layer(layer) => layer,
         Fuzz::Simple { fuzziness, .. } => {
-            let mut floats = head([2, 0, 0, 0], [*fuzziness, 1.0, 0.0, 0.0], Vec3::ONE, Vec3::Z);
-            floats.extend([0.0; 20 * FUZZ_TILTS]);
-            return floats;
+            return FuzzMaterial {
+                flags: [2, 0, 0, 0].into(),
+                factors: [*fuzziness, 1.0, 0.0, 0.0].into(),
+                color: Vec3::ONE.extend(0.0).into(),
+                direction: Vec3::Z.extend(0.0).into(),
+                ..none
+            };
         }
     };
     let phase = match layer.phase {
@@ -67,20 +69,23 @@ fn of_fuzz(fuzz: &RenderFuzz) -> Vec<f32> {
         FuzzAttenuation::None => 3,
     };
     let mapped = f32::from(u8::from(fuzz.direction.is_some()));
-    let mut floats = head(
-        [1, phase, attenuation, u32::from(fuzz.talk_ambient)],
-        [layer.density, fuzz_alpha(layer.spread), layer.normal_smoothness, mapped],
-        layer.color,
-        fibre_direction(layer.tilt, layer.azimuth),
-    );
     let fits = fuzz.fits.as_ref().expect("fit_fuzz comes before the GPU");
-    for c in &fits.tilts {
-        floats.extend(c.p_s);
-        floats.extend([c.r, 0.0]);
-        floats.extend(c.ambient);
-        floats.extend(c.direction);
+    let coefficients = fits.tilts.iter().flat_map(|c| {
+        let [p0, p1, p2, p3, p4, p5] = c.p_s;
+        let [a0, a1, a2, a3, a4, a5, a6, a7] = c.ambient;
+        [[p0, p1, p2, p3], [p4, p5, c.r, 0.0], [a0, a1, a2, a3], [a4, a5, a6, a7], c.direction]
+    });
+    let mut uniform = FuzzMaterial {
+        flags: [1, phase, attenuation, u32::from(fuzz.talk_ambient)].into(),
+        factors: [layer.density, fuzz_alpha(layer.spread), layer.normal_smoothness, mapped].into(),
+        color: layer.color.extend(0.0).into(),
+        direction: fibre_direction(layer.tilt, layer.azimuth).extend(0.0).into(),
+        ..none
+    };
+    for (held, coefficients) in uniform.coefficients.iter_mut().zip(coefficients) {
+        *held = coefficients.into();
     }
-    floats
+    uniform
 }
 
 /// A texture for the table of combed fibres, one for each material, that its fuzz may be another one later.

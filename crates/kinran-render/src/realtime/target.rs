@@ -1,11 +1,26 @@
 //! What a renderer draws into.
 
-use super::device::read_back;
-use super::{DEPTH, G_BUFFER, Gpu, HDR, Realtime, SUM, Timer, color_attachment, depth_attachment};
+use encase::ShaderSize;
+
+use super::device::{Gpu, read_back};
+use super::frame::Frame;
+use super::timer::Timer;
 use crate::Error;
 use crate::reference::Film;
 
-/// The buffers of a picture of one size, and the sum of the frames drawn so far.
+pub(super) const HDR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+pub(super) const SUM: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// Base colour, normal, factors.
+pub(super) const G_BUFFER: [wgpu::TextureFormat; 3] =
+    [wgpu::TextureFormat::Rgba8UnormSrgb, wgpu::TextureFormat::R32Uint, wgpu::TextureFormat::Rgba8Unorm];
+
+/// Texels along a side of the shadow map; chosen by eye.
+const SHADOW_SIZE: u32 = 2048;
+
+/// The buffers of a picture of one size, and the sum of the frames drawn so far. What a frame is drawn with, its shadow map and
+/// its settings, belongs to its picture: a renderer may draw several in turn.
 pub struct Target {
     /// Pixels in a row, rows.
     pub size: (u32, u32),
@@ -16,10 +31,14 @@ pub struct Target {
     g_buffer: [wgpu::TextureView; 3],
     /// Written in turn.
     sums: [wgpu::TextureView; 2],
+    /// Drawn with the first frame.
+    shadow_map: wgpu::TextureView,
+    /// Of the last frame.
+    frame: wgpu::Buffer,
 }
 
 /// A texture that is drawn into and read.
-pub(super) fn texture(
+fn texture(
     device: &wgpu::Device,
     (width, height): (u32, u32),
     format: wgpu::TextureFormat,
@@ -42,9 +61,9 @@ pub(super) fn texture(
 }
 
 impl Target {
-    /// An empty picture. `size` must lie within the device's limits and not be zero.
-    pub fn new(renderer: &Realtime, size: (u32, u32)) -> Self {
-        let device = &renderer.gpu().device;
+    /// An empty picture.
+    pub(super) fn on(gpu: &Gpu, size: (u32, u32)) -> Self {
+        let device = &gpu.device;
         let texture = |format| texture(device, size, format);
         Self {
             size,
@@ -53,20 +72,35 @@ impl Target {
             depth: texture(DEPTH),
             g_buffer: G_BUFFER.map(texture),
             sums: [texture(SUM), texture(SUM)],
+            shadow_map: self::texture(device, (SHADOW_SIZE, SHADOW_SIZE), DEPTH),
+            frame: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("frame"),
+                size: Frame::SHADER_SIZE.get(),
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
         }
     }
 
-    /// Forgets all frames: the next one replaces them. To be called when what is drawn changes.
-    pub fn clear(&mut self, renderer: &Realtime) {
+    /// Forgets all frames.
+    pub(super) fn empty(&mut self, gpu: &Gpu) {
         if self.frames > 0 {
             self.frames = 0;
-            let device = &renderer.gpu().device;
-            self.sums = [texture(device, self.size, SUM), texture(device, self.size, SUM)];
+            self.sums = [(); 2].map(|()| texture(&gpu.device, self.size, SUM));
         }
     }
 
     pub(super) fn hdr(&self) -> &wgpu::TextureView {
         &self.hdr
+    }
+
+    pub(super) fn shadow_map(&self) -> &wgpu::TextureView {
+        &self.shadow_map
+    }
+
+    /// The uniform of the last frame.
+    pub(super) fn frame(&self) -> &wgpu::Buffer {
+        &self.frame
     }
 
     pub(super) fn depth(&self) -> &wgpu::TextureView {
@@ -161,4 +195,36 @@ impl Target {
         let pixels = rows.flat_map(|row| row[..16 * width as usize].chunks_exact(16).map(pixel)).collect();
         Ok(Film { width, height, pixels })
     }
+}
+
+pub(super) fn depth_attachment(
+    view: &wgpu::TextureView,
+    load: wgpu::LoadOp<f32>,
+) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
+        stencil_ops: None,
+    }
+}
+
+fn color_attachment(
+    view: &wgpu::TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+) -> Option<wgpu::RenderPassColorAttachment<'_>> {
+    let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
+    Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
+}
+
+pub(super) fn color_pass<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    view: &wgpu::TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+    timestamp_writes: Option<wgpu::RenderPassTimestampWrites>,
+) -> wgpu::RenderPass<'a> {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        color_attachments: &[color_attachment(view, load)],
+        timestamp_writes,
+        ..Default::default()
+    })
 }
