@@ -1,4 +1,27 @@
 //! Filters and solvers that turn authored maps into runtime textures.
+//!
+//! | module | what it makes |
+//! | --- | --- |
+//! | [`folder`], [`manifest`] | an understanding of what artists wrote |
+//! | [`aniso`] | mips of normals and roughness that keep the highlight's shape |
+//! | [`detail`] | maps that tiled layers turn into an authored target |
+//! | [`curvature`], [`skin_lut`] | curvature of meshes and tables, for skin |
+//! | [`fuzz_fit`] | coefficients of fibres |
+//! | [`cache`], [`stamps`] | what need not be made again |
+//!
+//! Colours and masks need no filter of their own:
+//!
+//! ```
+//! use kinran_bake::{aniso::Kernel, plain_levels};
+//! use kinran_image::{Channels, Image, Pixels, Transfer};
+//! use kinran_scene::Wrap;
+//!
+//! // Black and white average to half the light, which is code 188.
+//! let chequer = Image::new(2, 2, Channels::R, Pixels::U8(vec![0, 255, 255, 0]))?;
+//! let levels = plain_levels(&chequer, (2, 2), Transfer::Srgb, Kernel::Box, [Wrap::Repeat; 2]);
+//! assert_eq!(levels[1].rgba8, [188, 188, 188, 255]);
+//! # Ok::<(), kinran_image::Error>(())
+//! ```
 
 pub mod aniso;
 pub mod cache;
@@ -11,6 +34,7 @@ pub mod manifest;
 mod material;
 mod mips;
 mod patterns;
+mod simd;
 pub mod skin_lut;
 pub mod stamps;
 

@@ -13,6 +13,7 @@ use kinran_scene::Wrap;
 
 use crate::aniso::{Kernel, Taps, reduction};
 use crate::channels::{Place, read_channel};
+use crate::simd::dispatch;
 
 /// Rows in a band: the unit of parallel work, a multiple of the four rows of a block.
 pub const BAND_ROWS: u32 = 16;
@@ -178,13 +179,7 @@ impl<R: PlaneRows, C> Pass<'_, R, C> {
         let (y0, row_len) = (i * BAND_ROWS as usize, step.row_len::<R>());
         let rows = &step.rows[y0..y0 + samples.len() / row_len];
         if depth == 0 {
-            pulp::Arch::new().dispatch(ReduceBand {
-                source: self.source,
-                first_row: 0,
-                step,
-                rows,
-                coarse: samples,
-            });
+            dispatch(ReduceBand { source: self.source, first_row: 0, step, rows, coarse: samples });
         } else {
             let finer = &self.steps[depth - 1];
             let finer_len = finer.row_len::<R>();
@@ -197,7 +192,7 @@ impl<R: PlaneRows, C> Pass<'_, R, C> {
                 self.make_band(depth - 1, j, band, room, memory, made);
                 let source = Finer::<R>::Samples(band);
                 let first_row = j * BAND_ROWS as usize;
-                pulp::Arch::new().dispatch(ReduceBand { source, first_row, step, rows, coarse });
+                dispatch(ReduceBand { source, first_row, step, rows, coarse });
             }
         }
         let band = PlaneBand { level: step.level, width: step.columns.len(), y0, rows: rows.len(), samples };
@@ -222,6 +217,7 @@ impl<R: PlaneRows> pulp::WithSimd for ReduceBand<'_, R> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Step { fine_width, ref columns, columns_halve, .. } = *self.step;
         let width = columns.len();
+        debug_assert_eq!(self.coarse.len(), self.rows.len() * width * R::PLANES, "a row for all taps");
         let mut scratch = R::Scratch::default();
         let mut tile = vec![[0.0; TILE]; R::PLANES];
         let mut fine = vec![0.0; if columns_halve { 0 } else { fine_width * R::PLANES }];
@@ -459,7 +455,37 @@ pub(crate) fn unorm8(v: f32) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use super::unorm8;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Bands are cut where it suits the caches; wherever that is, rows are the same.
+        #[test]
+        fn rows_depend_on_the_band_they_are_averaged_in(
+            size in (1_u32..90, 2_u32..70),
+            tent in any::<bool>(),
+            band in 1_usize..40,
+            samples in prop::collection::vec(any::<u8>(), 64),
+        ) {
+            let count = (size.0 * size.1) as usize;
+            let samples = samples.iter().cycle().take(count).copied().collect();
+            let image = Image::new(size.0, size.1, Channels::R, Pixels::U8(samples)).unwrap();
+            let (kernel, wrap) = (if tent { Kernel::Tent } else { Kernel::Box }, [Wrap::Repeat; 2]);
+            let source = ImagePlanes { image: &image, size, transfer: Transfer::Srgb, wrap };
+            let step = Step::new(size, 1, kernel, wrap);
+            let reduce = |rows: &[Taps]| {
+                let mut coarse = vec![0.0; rows.len() * step.row_len::<ImagePlanes>()];
+                let finer = Finer::Source(&source);
+                dispatch(ReduceBand { source: finer, first_row: 0, step: &step, rows, coarse: &mut coarse });
+                coarse
+            };
+            let banded: Vec<f32> = step.rows.chunks(band).flat_map(reduce).collect();
+            prop_assert_eq!(banded, reduce(&step.rows));
+        }
+    }
 
     #[test]
     fn a_value_is_not_rounded_to_the_nearest_byte() {

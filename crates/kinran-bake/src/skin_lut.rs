@@ -1,4 +1,17 @@
 //! Tables of pre-integrated skin: punctual light, ambient light, shadows' penumbras.
+//!
+//! ```
+//! use kinran_bake::skin_lut::{Profile, TableFormat, punctual_table};
+//!
+//! let burley = Profile::Burley([1.2, 0.5, 0.3]);
+//! let table = punctual_table(burley.radial()?, 32, 8, 0.5);
+//! let texture = table.texture(TableFormat::Rgba16F)?;
+//! assert!(table.texture_error(&texture)? < 1e-3);
+//! // At the terminator, bent as a nose is: red light has come around.
+//! let [red, _, blue] = table.sample(0.5, 0.5);
+//! assert!(red > blue);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use kinran_image::{Error, Format, Level, Texture, Transfer, encode_half};
 use kinran_shading::skin::profile::{Gaussian, LinearProfile, ProfileError, RadialProfile};

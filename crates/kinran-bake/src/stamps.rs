@@ -1,4 +1,15 @@
 //! Hashes of files, remembered for as long as the files look the same.
+//!
+//! ```
+//! use kinran_bake::stamps::Stamps;
+//!
+//! let folder = tempfile::tempdir()?;
+//! let file = folder.path().join("map.png");
+//! std::fs::write(&file, "texels")?;
+//! let stamps = Stamps::default();
+//! assert_eq!(stamps.hash(&file)?, stamps.hash(&file)?, "the second time by the file's date and size");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, Metadata};

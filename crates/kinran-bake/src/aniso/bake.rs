@@ -18,6 +18,7 @@ use super::maps::{DirectionMap, RoughnessMaps, SurfaceMaps, TexelSpan};
 use super::ndf_error::ndf_error;
 use super::sheet::{Sheet, decode_aniso, decode_khr};
 use crate::mips::{BAND_ROWS, Rgba8Level, plain_levels, unorm8};
+use crate::simd::dispatch;
 
 /// One texture asked for.
 #[derive(Clone, Debug)]
@@ -206,13 +207,7 @@ fn encode_band(
     }
 
     let mut rgba8 = vec![0; count * 4];
-    pulp::Arch::new().dispatch(QuantiseBand {
-        sheet: request.sheet,
-        texels: &band.texels,
-        beside,
-        turn,
-        out: &mut rgba8,
-    });
+    dispatch(QuantiseBand { sheet: request.sheet, texels: &band.texels, beside, turn, out: &mut rgba8 });
     encode(request.encoding, &rgba8, band.width, band.rows)
 }
 

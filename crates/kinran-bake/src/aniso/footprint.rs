@@ -58,9 +58,16 @@ pub fn reduction(size: u32, level: usize, kernel: Kernel, wrap: Wrap) -> Vec<Tap
             }
             taps.retain(|tap| tap.1 > 0.0);
             taps.sort_by_key(|tap| tap.0);
+            debug_assert!(is_average(&taps), "{taps:?}");
             taps
         })
         .collect()
+}
+
+/// Taps in order, with weights that add up to one.
+fn is_average(taps: &Taps) -> bool {
+    let sum: f32 = taps.iter().map(|tap| tap.1).sum();
+    taps.is_sorted_by(|a, b| a.0 < b.0) && (sum - 1.0).abs() < 1e-3
 }
 
 /// Integral of the unit tent `1 - |t|` on [−1, 1] from −1 to `t`.
@@ -97,5 +104,6 @@ fn compose(taps: &Taps, finer: &[Taps]) -> Taps {
         }
         same
     });
+    debug_assert!(is_average(&sum), "{sum:?}");
     sum
 }

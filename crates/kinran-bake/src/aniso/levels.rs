@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use glam::vec3;
+use glam::{Vec3, vec3};
 use rayon::prelude::*;
 
 use kinran_image::{full_level_count, level_size};
@@ -13,6 +13,7 @@ use super::maps::{SurfaceMaps, TexelSpan, clamp_roughness};
 use super::moments::{LeanFilter, LinearFilter, MOMENTS, MomentFilter, NaiveFilter};
 use super::{dpd, ml, param};
 use crate::mips::{BAND_ROWS, PlaneBand, PlaneRows, TILE, reduce_levels};
+use crate::simd::dispatch;
 
 /// How a footprint of level 0 becomes one texel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -65,6 +66,19 @@ pub struct Band {
     pub texels: TexelSpan,
 }
 
+impl Band {
+    /// What decoding and every filter promise of their texels: unit normals, and roughness between nothing and one in every
+    /// direction, but for rounding.
+    fn is_sound(&self) -> bool {
+        let sound = |(n, a): (Vec3, Sym2)| {
+            let (most, least, _) = a.eigen();
+            n.is_normalized() && least >= -1e-4 && most <= 1.0 + 1e-4
+        };
+        self.texels.len() == (self.width * self.rows) as usize
+            && (0..self.texels.len()).all(|i| sound(self.texels.texel(i)))
+    }
+}
+
 /// Filters `maps` to a full mip chain and hands every band of every level to `consume`, in parallel; returns
 /// what it returned, in order, per level. Level 0 is passed as authored. The result does not depend on the
 /// number of threads.
@@ -77,6 +91,7 @@ pub fn filter_levels<T: Send>(
     let size = maps.size();
     let finest = in_bands(size, 0, |band| {
         maps.decode_rows(size, band.y0, band.rows, &mut band.texels);
+        debug_assert!(band.is_sound(), "level 0, rows from {}", band.y0);
         consume(band)
     });
     std::iter::once(finest).chain(coarser_levels(maps, filter, kernel, &consume)).collect()
@@ -161,7 +176,7 @@ fn moment_levels<F: MomentFilter, T: Send>(
     let source = MomentRows::<F> { maps, size: maps.size(), filter: PhantomData };
     reduce_levels(&source, source.size, kernel, maps.wrap, |planes, texels: &mut TexelSpan| {
         texels.clear();
-        pulp::Arch::new().dispatch(ExtractBand::<F> { planes: &planes, texels, filter: PhantomData });
+        dispatch(ExtractBand::<F> { planes: &planes, texels, filter: PhantomData });
         let band = Band {
             level: planes.level,
             width: planes.width as u32,
@@ -169,6 +184,7 @@ fn moment_levels<F: MomentFilter, T: Send>(
             rows: planes.rows as u32,
             texels: std::mem::take(texels),
         };
+        debug_assert!(band.is_sound(), "level {}, rows from {}", band.level, band.y0);
         let made = consume(&band);
         *texels = band.texels;
         made
@@ -270,6 +286,7 @@ fn footprint_levels<T: Send>(
             in_bands(size, level, |band| {
                 let rows = &rows[band.y0 as usize..][..band.rows as usize];
                 fit_band(maps, columns, rows, &mut band.texels);
+                debug_assert!(band.is_sound(), "level {level}, rows from {}", band.y0);
                 consume(band)
             })
         })

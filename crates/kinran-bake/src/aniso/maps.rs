@@ -12,6 +12,7 @@ use kinran_shading::{
 };
 
 use crate::channels::{Place, read_channel, read_channels};
+use crate::simd::dispatch;
 
 /// A scalar map: one channel of an image times a factor, or the factor alone.
 #[derive(Clone, Debug)]
@@ -245,7 +246,7 @@ impl SurfaceMaps {
     }
 
     fn decode_part(&self, at: Place, part: Range<usize>, span: &mut TexelSpan) {
-        pulp::Arch::new().dispatch(DecodeSpan { maps: self, at, part, span });
+        dispatch(DecodeSpan { maps: self, at, part, span });
     }
 
     #[inline(always)]
@@ -456,4 +457,43 @@ fn read_vectors(image: &Image, at: Place, scratch: &mut [f32]) -> Vec<Vec2> {
         *v = if v.length_squared() > 6e-5 { v.normalize() } else { Vec2::X };
     }
     vectors
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// Maps of other sizes than level 0 are enlarged on the way.
+        #[test]
+        fn texels_depend_on_the_span_they_are_decoded_in(
+            own in (1_u32..40, 1_u32..4),
+            width in 1_u32..80,
+            span in 1_usize..40,
+            y in 0_u32..4,
+            samples in prop::collection::vec(any::<u8>(), 31),
+        ) {
+            let size = (width, 4);
+            let image = |(width, height): (u32, u32)| {
+                let samples = samples.iter().cycle().take((width * height * 3) as usize).copied().collect();
+                Arc::new(Image::new(width, height, Channels::Rgb, Pixels::U8(samples)).unwrap())
+            };
+            let maps = SurfaceMaps {
+                normal: NormalMap::new(image(size), false),
+                roughness: RoughnessMaps::Isotropic(ScalarMap::channel(image(own), 1)),
+                wrap: [Wrap::Repeat, Wrap::Clamp],
+            };
+            let decode = |x0: usize, len: usize| {
+                let mut texels = TexelSpan::default();
+                maps.decode_span(size, y, x0 as u32, len, &mut texels);
+                (0..len).map(|i| texels.texel(i)).collect::<Vec<_>>()
+            };
+            let width = width as usize;
+            let starts = (0..width).step_by(span);
+            let cut: Vec<_> = starts.flat_map(|x0| decode(x0, span.min(width - x0))).collect();
+            prop_assert_eq!(cut, decode(0, width));
+        }
+    }
 }

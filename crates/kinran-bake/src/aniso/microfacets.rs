@@ -22,6 +22,7 @@ use super::footprint::Taps;
 use super::lanes::{F8, LANES, V8};
 use super::maps::{SurfaceMaps, TexelSpan};
 use super::moments::{sggx_normals, sggx_roughness};
+use crate::simd::dispatch;
 
 /// Texels of a footprint looked at: all, or 32 × 32 of a larger one, or as many of a longer and narrower one. Each axis is
 /// cut into strata and one texel is drawn from each, at a different place in every row so that no weave lines up with it.
@@ -63,7 +64,7 @@ pub(super) trait Fit {
 /// Fits some rows of a level: `columns` are the footprints of their texels along x, `rows` those along y.
 pub(super) fn fit_band<F: Fit>(maps: &SurfaceMaps, columns: &[Taps], rows: &[Taps], out: &mut TexelSpan) {
     out.resize(columns.len() * rows.len());
-    pulp::Arch::new().dispatch(FitBand::<F> { maps, columns, rows, out, fit: PhantomData });
+    dispatch(FitBand::<F> { maps, columns, rows, out, fit: PhantomData });
 }
 
 struct FitBand<'a, F> {
@@ -610,4 +611,67 @@ pub(super) fn stepped(a: [F8; 3], next: [F8; 3], length: F8) -> [F8; 3] {
         indefinite.where_negative(next[1], xy),
         indefinite.where_negative(next[2], yy),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use kinran_image::{Channels, Image, Pixels};
+    use kinran_scene::Wrap;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::aniso::{Kernel, NormalMap, RoughnessMaps, ScalarMap, dpd, footprints, ml};
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        /// Of footprints of one size, as all within a level of even sides are.
+        #[test]
+        fn texels_depend_on_the_band_they_are_fitted_in(
+            size in (1_u32..6, 1_u32..6),
+            level in 1_usize..4,
+            band in 1_usize..20,
+            seed in any::<u32>(),
+        ) {
+            let size = (16 * size.0, 16 * size.1);
+            let mut state = seed | 1;
+            let mut noise = || {
+                let samples = (0..size.0 * size.1 * 3).map(|_| {
+                    state ^= state << 13;
+                    state ^= state >> 17;
+                    state ^= state << 5;
+                    64 + (state >> 25) as u8
+                });
+                let samples = Pixels::U8(samples.collect());
+                Arc::new(Image::new(size.0, size.1, Channels::Rgb, samples).unwrap())
+            };
+            let maps = SurfaceMaps {
+                normal: NormalMap::new(noise(), false),
+                roughness: RoughnessMaps::Isotropic(ScalarMap::channel(noise(), 0)),
+                wrap: [Wrap::Repeat; 2],
+            };
+            let of = |side| footprints(side, level + 1, Kernel::Box, Wrap::Repeat).swap_remove(level - 1);
+            let (columns, rows) = (of(size.0), of(size.1));
+            let fit = |rows: &[Taps], dpd: bool| {
+                let mut out = TexelSpan::default();
+                if dpd {
+                    dpd::fit_band(&maps, &columns, rows, &mut out);
+                } else {
+                    ml::fit_band(&maps, &columns, rows, &mut out);
+                }
+                [out.nx, out.ny, out.nz, out.axx, out.axy, out.ayy]
+            };
+            for dpd in [false, true] {
+                let mut banded: [Vec<f32>; 6] = Default::default();
+                for rows in rows.chunks(band) {
+                    for (all, more) in banded.iter_mut().zip(fit(rows, dpd)) {
+                        all.extend(more);
+                    }
+                }
+                prop_assert_eq!(banded, fit(&rows, dpd));
+            }
+        }
+    }
 }

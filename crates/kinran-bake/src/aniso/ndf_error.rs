@@ -7,6 +7,7 @@ use glam::Vec3;
 use kinran_shading::{Sym2, UNIT_SLOPES, microfacet_basis, sggx_d, sggx_from_ggx};
 
 use super::lanes::{F8, LANES, V8};
+use crate::simd::dispatch;
 
 /// Relative L2 error of one GGX lobe against the mean of others:
 /// `sqrt(∫ (D' - D)² h·z dω / ∫ D² h·z dω)`, where D is the mean of the texels' distributions.
@@ -17,7 +18,7 @@ use super::lanes::{F8, LANES, V8};
 /// mixes of two roughnesses), which give too few samples of their tails. Zero for an exact fit, about one for a lobe that has
 /// nothing to do with the footprint.
 pub fn ndf_error(texels: &[(Vec3, Sym2)], fit: (Vec3, Sym2)) -> f32 {
-    pulp::Arch::new().dispatch(NdfError { texels, fit })
+    dispatch(NdfError { texels, fit })
 }
 
 struct NdfError<'a> {

@@ -16,6 +16,7 @@
 use super::faces::{Corners, frame_tangents, turn};
 use super::surface::{Fans, Welded};
 use crate::aniso::lanes::{F8, LANES, V8};
+use crate::simd::dispatch;
 use glam::{Vec3, Vec4, Vec4Swizzles, vec4};
 use kinran_shading::Sym2;
 use rayon::prelude::*;
@@ -109,12 +110,7 @@ impl Average {
         let points = surface.positions.len();
         let mut areas = vec![0.0f32; points];
         let mut cotangents = vec![[0.0f32; 3]; surface.triangles.len()];
-        pulp::Arch::new().dispatch(Cotangents {
-            surface,
-            scale,
-            cotangents: &mut cotangents,
-            areas: &mut areas,
-        });
+        dispatch(Cotangents { surface, scale, cotangents: &mut cotangents, areas: &mut areas });
 
         // Neighbours in the order in which they are met around the point, with cotangent weights, and rates.
         let gathered: Vec<(Band, Vec<f64>)> = (0..points.div_ceil(BAND))
@@ -129,7 +125,7 @@ impl Average {
                     owners.resize(links.len(), point as u32);
                     ends.push(links.len() as u32);
                 }
-                pulp::Arch::new().dispatch(Transport { normals, owners: &owners, links: &mut links });
+                dispatch(Transport { normals, owners: &owners, links: &mut links });
                 links.shrink_to_fit();
                 let band = Band { ends, links, keep: Vec::new() };
                 let rates = (range.zip(band.by_point())).map(|(point, links)| {

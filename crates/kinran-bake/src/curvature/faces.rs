@@ -13,6 +13,7 @@
 
 use super::surface::Welded;
 use crate::aniso::lanes::{F8, LANES, V8};
+use crate::simd::dispatch;
 use glam::Vec3;
 use kinran_shading::Sym2;
 
@@ -45,7 +46,7 @@ pub(crate) fn face_tensors(surface: &Welded, normals: &[Vec3]) -> PointTensors {
     // xx, xy, yy and the weight.
     let mut sums = vec![[0.0f32; 4]; surface.positions.len()];
     let scale = surface.unit_scale();
-    let degenerate = pulp::Arch::new().dispatch(Faces { surface, normals, scale, sums: &mut sums });
+    let degenerate = dispatch(Faces { surface, normals, scale, sums: &mut sums });
     let tensors = sums.iter().map(|&[xx, xy, yy, w]| {
         let inverse = if w > 0.0 { scale / w } else { 0.0 };
         Sym2 { xx, xy, yy } * inverse

@@ -4,6 +4,29 @@
 //! curvature is clamped to zero, the rest is blurred along the surface, and every vertex gets its tensor in the frame
 //! of its own tangent, packed into four bytes. Convex is positive: a sphere of radius r with outward normals
 //! has 1/r.
+//!
+//! ```
+//! use glam::{Vec3, vec3};
+//! use kinran_bake::curvature::{Mesh, Method, Options, bake_curvature, principal};
+//!
+//! // A cylinder of radius 2 mm along z.
+//! let (sides, rings) = (48, 24);
+//! let normal = |i: usize| Vec3::from((glam::Vec2::from_angle((i % sides) as f32 * 6.283_185_5 / sides as f32), 0.0));
+//! let normals: Vec<Vec3> = (0..sides * rings).map(normal).collect();
+//! let positions: Vec<Vec3> = (0..sides * rings).map(|i| 2.0 * normals[i] + vec3(0.0, 0.0, (i / sides) as f32 * 0.26)).collect();
+//! let quad = |i: usize| {
+//!     let (ring, side) = (i / sides * sides, i % sides);
+//!     let [a, b, c, d] = [ring + side, ring + (side + 1) % sides, ring + sides + side, ring + sides + (side + 1) % sides];
+//!     [[a, b, c], [b, d, c]].map(|t| t.map(|i| i as u32))
+//! };
+//! let triangles: Vec<[u32; 3]> = (0..sides * (rings - 1)).flat_map(quad).collect();
+//! let mesh = Mesh { positions: &positions, normals: Some(&normals), tangents: None, triangles: &triangles };
+//! let options = Options { method: Method::Normals, millimetres: 1.0, blur: vec![], clamp: true };
+//! let baked = bake_curvature(&mesh, &options, &|_| {})?;
+//! let (across, along, _) = principal(baked.tensors[sides * rings / 2]);
+//! assert!((across - 0.5).abs() < 0.01 && along.abs() < 0.01, "{across} {along}");
+//! # Ok::<(), kinran_bake::curvature::CurvatureError>(())
+//! ```
 
 mod blur;
 mod faces;

@@ -22,6 +22,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::faces::frame;
 use super::surface::{Fans, Welded, others};
+use crate::simd::dispatch;
 use glam::{DVec3, Vec3};
 use kinran_shading::Sym2;
 use rayon::prelude::*;
@@ -108,8 +109,7 @@ fn fit<T: Send>(
     let bands = results.par_chunks_mut(BAND).enumerate();
     let unfitted = bands.map_init(rings, |rings, (band, results)| {
         let first = band * BAND;
-        let unfitted =
-            pulp::Arch::new().dispatch(FitBand { surface, fans, normals, rings, first, results, of: &of });
+        let unfitted = dispatch(FitBand { surface, fans, normals, rings, first, results, of: &of });
         progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f32 / count as f32);
         unfitted
     });

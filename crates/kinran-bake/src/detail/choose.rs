@@ -156,6 +156,9 @@ impl ChooseBand<'_> {
     fn choose<S: Simd>(self, simd: S, operator: impl Operator, blend: Blending) {
         let size = if self.format == Format::Bc7 { 16 } else { 8 };
         let columns = self.width.div_ceil(4);
+        debug_assert!(self.target.iter().flatten().all(|plane| plane.len() == self.width), "whole rows");
+        debug_assert_eq!(self.detail.len(), self.target.len(), "a detail for each row");
+        debug_assert_eq!(self.blocks.len(), columns * size * self.target.len().div_ceil(4), "whole blocks");
         let mut lines = [Line::default(); 256];
         for (byte, line) in (0..=255).zip(&mut lines) {
             *line = blend.line(self.stored.value(byte));
@@ -501,6 +504,7 @@ mod tests {
     use kinran_shading::detail::{detail_over, overlay, smooth_overlay};
 
     use super::*;
+    use crate::simd::dispatch;
 
     struct One<'a>(&'a BlockGoal, Line);
 
@@ -528,7 +532,7 @@ mod tests {
                     goal.t[0][i] = ((i * 7) % 16) as f32 / 15.0;
                     goal.gain[0][i] = 1.0;
                 }
-                let got = pulp::Arch::new().dispatch(One(&goal, blending.line(s)));
+                let got = dispatch(One(&goal, blending.line(s)));
                 for i in 0..TEXELS {
                     let want = (blend(s, goal.d[0][i]) - goal.t[0][i]).powi(2);
                     assert!(

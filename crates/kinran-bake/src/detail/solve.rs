@@ -20,6 +20,7 @@ use super::map::{
     MapKind, Planes, bytes_of_planes, for_each_row, mip_chain, planes_of_image, synthesized_level, texture,
 };
 use super::operator::{Blend, Operator, Plain, RUN, Smooth, run_of};
+use crate::simd::dispatch;
 
 /// How a target is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -250,7 +251,7 @@ pub fn synthesize(
         rows.row(y, &mut room, &mut detail);
         let target_row = std::array::from_fn(|c| planes.row(c, y));
         let row = SolveRow { row: target_row, detail: &detail, target, srgb, options, out };
-        pulp::Arch::new().dispatch(row);
+        dispatch(row);
     }
     Ok(())
 }
@@ -360,7 +361,7 @@ impl Band<'_> {
         };
         if chosen {
             let rows = self.y0..self.y0 + self.rows;
-            pulp::Arch::new().dispatch(ChooseBand {
+            dispatch(ChooseBand {
                 width,
                 target: rows.map(|y| std::array::from_fn(|c| self.planes.row(c, y))).collect(),
                 detail: if authored.is_some() { &before } else { &seen },
@@ -393,7 +394,7 @@ impl Band<'_> {
             options: self.options,
             out,
         };
-        self.sums.unreached += pulp::Arch::new().dispatch(row);
+        self.sums.unreached += dispatch(row);
     }
 
     /// Decodes the band again and compares the blended result with the target.
@@ -541,6 +542,9 @@ impl pulp::WithSimd for SolveRow<'_> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> u64 {
         let SolveRow { row, detail, target, srgb, options, out } = self;
+        debug_assert!(row.iter().all(|plane| plane.len() == row[0].len()), "planes of one width");
+        debug_assert!(detail.iter().all(|plane| plane.len() == row[0].len()), "a detail for each texel");
+        debug_assert_eq!(out.len(), 4 * row[0].len(), "four bytes a texel");
         match target.kind {
             MapKind::Color | MapKind::Data => {
                 match options.blend {
@@ -635,4 +639,49 @@ fn overlay_rows(
 #[inline(always)]
 fn rounded(v: f32) -> u32 {
     (v + 8_388_608.0).to_bits() & 0xff
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::detail::{Tile, TileOptions};
+    use kinran_image::{Encoder, Preset};
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn blocks_depend_on_the_band_they_are_solved_in(
+            size in (4_u32..40, 4_u32..40),
+            kind in prop::sample::select(vec![MapKind::Color, MapKind::Normal, MapKind::Aniso]),
+            blocks in 1_usize..9,
+            bytes in prop::collection::vec(60_u8..200, 96),
+        ) {
+            let picture = |skip: usize, (width, height): (u32, u32)| {
+                let samples = bytes.iter().cycle().skip(skip).take((width * height * 3) as usize);
+                Image::new(width, height, Channels::Rgb, Pixels::U8(samples.copied().collect())).unwrap()
+            };
+            let format = if kind == MapKind::Normal { Format::Bc5 } else { Format::Bc7 };
+            let encoding = Encoding { format, encoder: Encoder::Portable, preset: Preset::Fast };
+            let tile = Tile::new(&picture(5, (16, 16)), TileOptions::new(kind, encoding)).unwrap();
+            let layers = [Layer::new(&tile)];
+            let target = Target::new(&picture(0, size), kind, false).unwrap();
+            let options = DetailOptions::new(encoding);
+            let planes = &target.levels[0];
+            let seen = |seen| DetailRows::new(&layers, kind, size, seen);
+            let (decoded, authored) = (seen(Seen::Decoded), seen(Seen::Authored));
+            let solve = |y0: usize, rows: usize| {
+                let (target, options) = (&target, &options);
+                let sums = Sums::default();
+                let mut band = Band { planes, target, options, compensation: 0.5, srgb: false, y0, rows, sums };
+                band.solve(&decoded, Some(&authored), &mut RowRoom::default()).unwrap().0
+            };
+            let height = size.1 as usize;
+            let starts = (0..height).step_by(4 * blocks);
+            let banded: Vec<u8> = starts.flat_map(|y0| solve(y0, (4 * blocks).min(height - y0))).collect();
+            prop_assert_eq!(banded, solve(0, height));
+        }
+    }
 }

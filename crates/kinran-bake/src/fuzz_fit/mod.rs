@@ -3,6 +3,13 @@
 //! What the shader library's `fuzz_p_s`, `fuzz_ambient_factor`, `fuzz_ambient_direction` and
 //! `fuzz_ambient_attenuation` ask for, fitted in double precision when a material is built: a few
 //! milliseconds. Beside them stand the fits of the talk, to compare with.
+//!
+//! ```
+//! use kinran_bake::fuzz_fit::{Phase, fuzz_fit};
+//!
+//! let upright = fuzz_fit(Phase::Fibre, 0.0, 0.5);
+//! assert!(upright.p_s.max_error < 0.05, "{}", upright.p_s.max_error);
+//! ```
 
 mod exact;
 mod least_squares;
