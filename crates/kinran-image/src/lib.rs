@@ -3,6 +3,26 @@
 //! [`Image`] is what a person authored (PNG, JPEG, TGA, BMP, WebP, TIFF, HDR, EXR), [`Texture`] is what an engine
 //! loads (a mip chain in one [`Format`], in a KTX2 or DDS container). Every reader takes bytes that may
 //! be damaged or hostile and answers with an [`Error`] that names the file and the reason.
+//!
+//! ```
+//! use kinran_image::{Channels, Encoder, Encoding, Format, Image, Level, Pixels, Preset, Texture, Transfer};
+//! use kinran_image::{decode_image, decode_ktx2, encode, encode_ktx2, encode_png};
+//!
+//! // An authored image, by way of PNG.
+//! let grey = Image::new(8, 8, Channels::R, Pixels::U8((0..64).map(|i| 4 * i).collect()))?;
+//! let image = decode_image("ramp.png".as_ref(), &encode_png(&grey)?)?;
+//! assert_eq!(image, Image { transfer: image.transfer, ..grey });
+//!
+//! // Its texels in blocks, in a container that engines load.
+//! let encoding = Encoding { format: Format::Bc4, encoder: Encoder::Portable, preset: Preset::Normal };
+//! let rgba8: Vec<u8> = (0..64).flat_map(|i| [4 * i, 0, 0, 255]).collect();
+//! let levels = vec![Level { width: 8, height: 8, data: encode(encoding, &rgba8, 8, 8)? }];
+//! let texture = Texture { format: Format::Bc4, transfer: Transfer::Linear, levels, metadata: Default::default() };
+//! let file = encode_ktx2(&texture, None)?;
+//! let back = decode_ktx2("ramp.ktx2".as_ref(), &file)?;
+//! assert!((back.decode_level(0)?[9][0] - 36.0 / 255.0).abs() < 0.02);
+//! # Ok::<(), kinran_image::Error>(())
+//! ```
 
 mod block;
 mod dds_file;

@@ -1,4 +1,13 @@
 //! How far two pictures are apart.
+//!
+//! ```
+//! use kinran_render::metrics::{flip, rmse_srgb8};
+//!
+//! let (black, white) = ([[0; 3]; 64], [[255; 3]; 64]);
+//! assert_eq!(rmse_srgb8(&black, &white)?, 1.0);
+//! assert!(flip(&black, &white, 8, 8)?.mean > 0.9);
+//! # Ok::<(), kinran_render::Error>(())
+//! ```
 
 use crate::Error;
 

@@ -1,4 +1,13 @@
 //! From scene radiance to display values.
+//!
+//! ```
+//! use kinran_render::tonemap::{Tonemap, to_srgb8};
+//!
+//! // Twice the light of white has no room on a display; ACES leaves some for it.
+//! let bright = [[2.0; 3]];
+//! assert_eq!(to_srgb8(&bright, 0.0, Tonemap::None), [[255; 3]]);
+//! assert!(to_srgb8(&bright, 0.0, Tonemap::Aces)[0][0] < 255);
+//! ```
 
 use glam::{Mat3, Vec3, vec3};
 use kinran_image::srgb::srgb_from_linear;

@@ -6,6 +6,22 @@
 //! `sigma` is `alpha / sqrt(2)`.
 //!
 //! Transcendental functions come from the `libm` crate, so that results do not depend on the system's.
+//!
+//! Brushed metal is rough across the brush and smooth along it, so that its highlight is long:
+//!
+//! ```
+//! use glam::vec3;
+//! use kinran_shading::{alpha_from_roughness, ggx_aniso_d, schlick_f, smith_aniso_v};
+//!
+//! let (alpha_t, alpha_b) = (alpha_from_roughness(0.7), alpha_from_roughness(0.3));
+//! let (u, v, h) = (vec3(0.6, 0.0, 0.8), vec3(0.0, 0.0, 1.0), vec3(0.316_228, 0.0, 0.948_683));
+//! let lobe = ggx_aniso_d(h, alpha_t, alpha_b) * smith_aniso_v(u, v, alpha_t, alpha_b);
+//! let reflected = lobe * schlick_f(vec3(0.9, 0.8, 0.6), v.dot(h)) * u.z;
+//!
+//! let aside = vec3(h.y, h.x, h.z);
+//! assert!(ggx_aniso_d(h, alpha_t, alpha_b) > 10.0 * ggx_aniso_d(aside, alpha_t, alpha_b));
+//! assert!(reflected.cmpgt(glam::Vec3::ZERO).all());
+//! ```
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 mod aniso;

@@ -5,6 +5,15 @@
 //!
 //! Coefficients stand in the order (l, m) = (0,0), (1,-1), (1,0), (1,1), (2,-2) .. (2,2). The basis is
 //! orthonormal over the sphere, its polar axis is z, without the Condon-Shortley phase.
+//!
+//! ```
+//! use glam::{Vec3, vec3};
+//! use kinran_shading::sh::{Sh9, sh_basis, sh_irradiance};
+//!
+//! // A light far above, as narrow as nine coefficients can be.
+//! let radiance: Sh9 = sh_basis(Vec3::Y).map(Vec3::splat);
+//! assert!(sh_irradiance(&radiance, Vec3::Y).x > sh_irradiance(&radiance, vec3(0.6, 0.8, 0.0)).x);
+//! ```
 
 use core::f32::consts::PI;
 

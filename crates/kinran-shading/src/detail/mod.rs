@@ -10,6 +10,14 @@
 //! Colour is linear light, as a sampler with sRGB decoding returns it; `s` itself is stored without sRGB. Then
 //! the steps of 8 bits around s = 1/2 are finer than those of the target's own sRGB code: there
 //! `d srgb(t) = 0.83 srgb(t) ds` where overlay on codes has up to `2 ds`.
+//!
+//! ```
+//! use kinran_shading::detail::{smooth_overlay, smooth_overlay_inverse};
+//!
+//! let (target, detail) = (0.3, 0.6);
+//! let s = smooth_overlay_inverse(target, detail);
+//! assert!((smooth_overlay(s, detail) - target).abs() < 1e-5);
+//! ```
 
 mod hsv;
 mod layer;

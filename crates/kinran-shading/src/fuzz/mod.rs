@@ -12,6 +12,18 @@
 //!
 //! One exponential a light serves both the lobe and what is left for the base:
 //! `e^(-d (1/u·n + 1/v·n)) = P_p(u) P_e(v)`.
+//!
+//! ```
+//! use glam::vec3;
+//! use kinran_shading::fuzz::{fibre_direction, fuzz_alpha, fuzz_brdf};
+//!
+//! // Fibres combed along x glow for a light that comes over them at a grazing angle.
+//! let (t, alpha) = (fibre_direction(1.2, 0.0), fuzz_alpha(0.3));
+//! let view = vec3(0.0, 0.0, 1.0);
+//! let over = fuzz_brdf(vec3(0.0, 0.96, 0.28), view, t, 0.3, alpha);
+//! let above = fuzz_brdf(vec3(0.0, 0.28, 0.96), view, t, 0.3, alpha);
+//! assert!(over > above && above > 0.0);
+//! ```
 
 mod ambient;
 mod deferred;

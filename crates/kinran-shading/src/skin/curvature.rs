@@ -1,4 +1,16 @@
 //! The curvature tensor of a vertex: four bytes, and the curvature towards a light.
+//!
+//! ```
+//! use glam::vec2;
+//! use kinran_shading::Sym2;
+//! use kinran_shading::skin::curvature::{curvature_decode, curvature_encode, curvature_from_light};
+//!
+//! // A finger: round across, straight along. Light across it sees the curvature, light along it none.
+//! let finger = Sym2 { xx: 0.12, xy: 0.0, yy: 0.0 };
+//! let (tensor, mean) = curvature_decode(curvature_encode(finger, 0.06, 0.5), 0.5);
+//! assert!((mean - 0.06).abs() < 1e-3);
+//! assert!(curvature_from_light(tensor, vec2(1.0, 0.0)) > curvature_from_light(tensor, vec2(0.0, 1.0)));
+//! ```
 
 use crate::{Sym2, sqrt::sqrt};
 use glam::{Vec2, Vec4, vec4};

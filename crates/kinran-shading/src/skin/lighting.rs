@@ -1,4 +1,12 @@
 //! Light on skin: where to look into the tables, ambient light, gloss, and normals by channel.
+//!
+//! ```
+//! use glam::vec2;
+//! use kinran_shading::skin::lighting::skin_lut_uv;
+//!
+//! // At the terminator, for half the table's largest curvature of 0.5 per millimetre.
+//! assert_eq!(skin_lut_uv(0.0, 0.25, 1.0 / 0.5), vec2(0.5, 0.5));
+//! ```
 
 use crate::sh::{COSINE_LOBE, Sh9, sh_basis};
 use crate::{ggx_d, smith_v};

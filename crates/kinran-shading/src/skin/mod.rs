@@ -8,6 +8,16 @@
 //! a [`RadialProfile`](profile::RadialProfile) is per area, against the distance from a point, and belongs on a
 //! sphere (ambient light); a [`LinearProfile`](profile::LinearProfile) is per length, against the distance from
 //! a line, and belongs on a cylinder (punctual light).
+//!
+//! ```
+//! use kinran_shading::skin::profile::RadialProfile;
+//!
+//! // A row of the table: skin that bends with a radius of 10 mm. Red reaches around the terminator.
+//! let mut row = [[0.0; 3]; 32];
+//! RadialProfile::skin().to_linear().ring_row(0.1, &mut row);
+//! let [red, green, blue] = row[14];
+//! assert!(red > green && green > blue && blue >= 0.0);
+//! ```
 
 mod bessel;
 pub mod curvature;

@@ -6,6 +6,13 @@
 //! is drawn again, half as wide and in the lit half of that penumbra, and blurred by the linear profile, for a
 //! shadow's edge is a line; what leaks past its new edge has the dark half to show in. The filter is taken to be a box,
 //! under which light grows along a straight line.
+//!
+//! ```
+//! use kinran_shading::skin::profile::RadialProfile;
+//!
+//! let [red, _, blue] = RadialProfile::skin().to_linear().penumbra(0.3, 4.0);
+//! assert!(red > blue, "light that leaks into a shadow is red");
+//! ```
 
 use super::profile::{LinearProfile, Shape};
 use core::f64::consts::PI;

@@ -8,6 +8,14 @@
 //!
 //! Profiles are normalised where they are used, so a colour of their own has no effect: what remains is how far
 //! red, green and blue spread.
+//!
+//! ```
+//! use kinran_shading::skin::profile::{ProfileError, RadialProfile};
+//!
+//! let [red, green, _] = RadialProfile::skin().density(2.0);
+//! assert!(red > 10.0 * green, "two millimetres away red light leaves");
+//! assert_eq!(RadialProfile::burley([1.0, 0.0, 1.0]), Err(ProfileError::OutOfRange));
+//! ```
 
 use super::bessel::k0;
 use super::samples::{self, Sample};

@@ -7,6 +7,16 @@
 //!
 //! With p the normalised density of the angle and s = sin θ_l the integral is `cos θ_l A + sin θ_l B`, where A and B
 //! are those of `p cos` and `p sin` over the half circle that the light sees.
+//!
+//! ```
+//! use kinran_shading::skin::profile::RadialProfile;
+//! use kinran_shading::skin::ring::column_n_u;
+//!
+//! // Where nothing bends, light falls as the clamped cosine.
+//! let mut row = [[0.0; 3]; 8];
+//! RadialProfile::skin().to_linear().ring_row(0.0, &mut row);
+//! assert_eq!(row[6], [column_n_u(6, 8); 3]);
+//! ```
 
 use super::bessel::{scaled_i0, scaled_i1};
 use super::profile::{Gaussian, LinearProfile, Shape};

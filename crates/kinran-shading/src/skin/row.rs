@@ -38,6 +38,7 @@ pub(super) trait Ring {
 pub(super) fn walk(ring: &mut impl Ring, row: &mut [[f64; 3]]) {
     let columns = row.len();
     let lit = columns / 2..columns;
+    debug_assert!(columns > 0, "a row has columns");
 
     // A and B are differences of integrals from 0: those up to π/2 - θ first, then those up to π/2 + θ.
     for i in lit.clone() {
@@ -56,6 +57,7 @@ pub(super) fn walk(ring: &mut impl Ring, row: &mut [[f64; 3]]) {
     }
     ring.advance(0.0, Half::Far);
     let Integrals { one, cos, .. } = ring.integrals();
+    debug_assert!(one.iter().all(|&mass| mass > 0.0 && mass.is_finite()), "light leaves somewhere: {one:?}");
 
     // The clamped cosine is half of cosine and its absolute value; the first turns its sign behind the terminator, where
     // rounding can leave -1e-17.

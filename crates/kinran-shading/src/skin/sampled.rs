@@ -1,5 +1,16 @@
 //! A tabulated linear profile with its integrals, and the ring of it: what takes time in proportion to a table's
 //! rows is done once, and a ring reads differences of integrals in place of densities.
+//!
+//! ```
+//! use kinran_shading::skin::profile::RadialProfile;
+//! use kinran_shading::skin::sampled::Sample;
+//!
+//! let rows = [(0.0, [1.0; 3]), (1.0, [0.5, 0.3, 0.2]), (4.0, [0.0; 3])];
+//! let table = RadialProfile::table(&rows).unwrap().to_linear();
+//! let mut samples = [Sample::default(); 4096];
+//! let fast = table.sampled(&mut samples);
+//! assert!((fast.density(0.7)[0] - table.density(0.7)[0]).abs() < 1e-4);
+//! ```
 
 use super::profile::{LinearProfile, Shape};
 use super::row::{Half, Integrals, Ring};
@@ -118,6 +129,8 @@ impl Ring for SampledRing<'_> {
 
 impl<'a> SampledRing<'a> {
     pub(super) fn new(samples: &'a [Sample], r: f64) -> Self {
+        debug_assert!(samples.is_sorted_by(|a, b| a.distance < b.distance), "distances grow");
+        debug_assert!(r > 0.0, "a radius of {r}");
         let nothing = [0.0; 3];
         let (mass, moment, one, cos) = (nothing, nothing, nothing, nothing);
         SampledRing { samples, r, half: (0.0, 1.0), passed: 0, mass, moment, one, cos }

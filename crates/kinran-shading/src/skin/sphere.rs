@@ -4,6 +4,14 @@
 //! On a sphere of radius r the area between two chords is the planar one, `dA = 2π c dc`, and `cos θ = 1 - c² / 2r²`. A
 //! blur that depends on the angle alone multiplies band l of the harmonics by the mean of the Legendre polynomial
 //! P_l(cos θ) under the profile (Funk–Hecke). Band 0 keeps its light.
+//!
+//! ```
+//! use kinran_shading::skin::profile::RadialProfile;
+//!
+//! // On a small sphere light from all around is blurred, detail before direction.
+//! let factors = RadialProfile::skin().band_factors(0.5);
+//! assert!(factors.h_two[0] < factors.h_one[0] && factors.h_one[0] < 1.0);
+//! ```
 
 use super::profile::{RadialProfile, Shape};
 use libm::{exp, expm1};
