@@ -2,7 +2,7 @@
 # Checks the KTX2 and DDS files that kinran-image writes with readers that are not ours: ktx-parse and zstddec
 # (npm, what three.js loads KTX2 with), texture2ddecoder and OpenImageIO (PyPI). Prints a line per file and
 # fails at any difference. Everything it installs goes to .tools/check_textures; a second run installs nothing.
-# KINRAN_BUILT names a folder of programs that are built already (target/release).
+# KINRAN_BUILT names a folder of programs that are built already (target/checked).
 set -euo pipefail
 cd "$(dirname "$0")"
 here=$PWD

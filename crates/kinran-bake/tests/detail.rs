@@ -147,7 +147,7 @@ fn three_layers_with_masks_and_shifts_are_one_detail() {
     let layer = |i: usize| Layer {
         transform: LayerTransform { scale: Vec2::splat(2.0 + i as f32), ..LayerTransform::default() },
         hsv: vec3(0.1 * i as f32, 0.8, 1.1),
-        mask: (i > 0).then_some(Mask { map: &mask, channel: i - 1, contrast: 3.0 }),
+        mask: i.checked_sub(1).map(|channel| Mask { map: &mask, channel, contrast: 3.0 }),
         ..Layer::new(&tiles[i])
     };
     let layers = [layer(0), layer(1), layer(2)];

@@ -179,6 +179,12 @@ fn encode_strip(
     let padded_w = block_columns * 4;
     let block_rows = out.len() / (block_columns * encoding.format.block_bytes());
     let rows = first * 4..(first + block_rows) * 4;
+    debug_assert_eq!(
+        out.len(),
+        block_rows * block_columns * encoding.format.block_bytes(),
+        "whole rows of blocks"
+    );
+    debug_assert!(rows.start < h && rows.end < h + 4, "rows {rows:?} of {h}");
 
     // BC1 is RGB here; an encoder that looks at alpha would punch holes.
     let drop_alpha = encoding.format == Format::Bc1 && encoding.encoder == Encoder::Portable;

@@ -105,6 +105,7 @@ impl Shading {
         filtering: TextureFiltering,
         curvature_range: f32,
     ) -> Self {
+        debug_assert!(view.is_normalized(), "a view of length {}", view.length());
         let base = base_color(material, point, filtering);
         let own = sample(&material.metallic_roughness, point, filtering);
         let own_occlusion = sample(&material.occlusion, point, filtering).x;
@@ -145,6 +146,7 @@ impl Shading {
         let (alpha_t, alpha_b) = (aniso.alpha_t, aniso.alpha_b);
         let frame = Mat3::from_cols(aniso.tangent, aniso.bitangent, normal);
         let v = frame.transpose() * view;
+        debug_assert!(v.z > 0.0 && (frame.determinant().abs() - 1.0).abs() < 1e-3, "{frame}, v {v}");
 
         let f0 = Vec3::splat(DIELECTRIC_F0).lerp(base.xyz(), metallic);
         let inside = 1.0 - specular_albedo(DIELECTRIC_F0, v, alpha_t, alpha_b);
@@ -186,6 +188,7 @@ impl Shading {
     /// The specular lobe for a light along `u` in the shading frame, per steradian, without the cosine.
     #[inline]
     pub(crate) fn specular(&self, u: Vec3) -> Vec3 {
+        debug_assert!(u.is_normalized(), "light along a vector of length {}", u.length());
         if u.z <= 0.0 {
             return Vec3::ZERO;
         }

@@ -94,6 +94,7 @@ impl MipTexture {
     #[inline]
     pub fn sample_level(&self, uv: Vec2, level: usize) -> Vec4 {
         let MipLevel { width, height, texels } = &self.levels[level];
+        debug_assert_eq!(texels.len(), *width as usize * *height as usize, "texels of level {level}");
         if texels.len() == 1 {
             return Vec4::from_array(texels[0]);
         }

@@ -204,7 +204,9 @@ impl Block {
             self.mode;
         let (mut all, mut at) = (1_u128 << number, number + 1);
         let mut put = |value: i32, bits: u32| {
-            all |= (value as u128) << at;
+            // Without anchors, as partitions are found, indices are zero and the last ones lie behind the block.
+            debug_assert!(value == 0 || at + bits <= 128, "{value} of {bits} bits at {at}");
+            all |= (value as u128).checked_shl(at).unwrap_or(0);
             at += bits;
         };
         put(self.partition as i32, partition_bits);
