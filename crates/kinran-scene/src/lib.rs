@@ -22,7 +22,7 @@
 //! let nothing_beside_it = |_: &str| Err(std::io::ErrorKind::NotFound.into());
 //! let scene = Scene::from_bytes("brass.gltf".as_ref(), gltf, &nothing_beside_it)?;
 //! assert_eq!(scene.primitives[0].normals, [glam::Vec3::Z; 3], "normals are made where there are none");
-//! assert_eq!(scene.materials[0].roughness, 0.4);
+//! assert_eq!(scene.materials[0].roughness_factor, 0.4);
 //!
 //! let mut document = Document::from_bytes("brass.gltf".as_ref(), gltf)?;
 //! document.material_mut(0).insert("name".into(), "copper".into());
