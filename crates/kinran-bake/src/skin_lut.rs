@@ -4,7 +4,7 @@
 //! use kinran_bake::skin_lut::{Profile, TableFormat, punctual_table};
 //!
 //! let burley = Profile::Burley([1.2, 0.5, 0.3]);
-//! let table = punctual_table(burley.radial()?, 32, 8, 0.5);
+//! let table = punctual_table(burley.radial()?, 32, 8, 0.5, &|_| {});
 //! let texture = table.texture(TableFormat::Rgba16F)?;
 //! assert!(table.texture_error(&texture)? < 1e-3);
 //! // At the terminator, bent as a nose is: red light has come around.

@@ -8,7 +8,7 @@
 //! use kinran_bake::fuzz_fit::{Phase, fuzz_fit};
 //!
 //! let upright = fuzz_fit(Phase::Fibre, 0.0, 0.5);
-//! assert!(upright.p_s.max_error < 0.05, "{}", upright.p_s.max_error);
+//! assert!(upright.p_s.rms_error < 0.05, "{:?}", upright.p_s);
 //! ```
 
 mod exact;
