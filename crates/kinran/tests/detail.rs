@@ -241,6 +241,14 @@ fn normals_are_solved_as_colours_whatever_their_name_says() {
     let told = warnings(&run(&words("Dark_Normal.png", "tile_normal.png", &[])));
     assert!(told.contains("Dark_Normal.png: its slopes say that green points down"), "{told}");
     assert_eq!(warnings(&run(&words("Dark_Normal.png", "tile_normal.png", &["--y-down"]))), "[]");
+    // DirectX by its name, and by its name only.
+    for (name, y_down) in [("Wall_Normal_DirectX", true), ("Sky_Normal_DirectX", false)] {
+        write_png(&folder.path(&format!("{name}.png")), &waves(y_down)).unwrap();
+    }
+    assert_eq!(warnings(&run(&words("Wall_Normal_DirectX.png", "tile_normal.png", &[]))), "[]");
+    let told = warnings(&run(&words("Sky_Normal_DirectX.png", "tile_normal.png", &[])));
+    assert!(told.contains("its slopes say that green points up (OpenGL); then give --y-up"), "{told}");
+    assert_eq!(warnings(&run(&words("Sky_Normal_DirectX.png", "tile_normal.png", &["--y-up"]))), "[]");
 }
 
 #[test]

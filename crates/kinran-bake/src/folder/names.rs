@@ -607,7 +607,12 @@ fn stem_before(name: &str, all: &[Piece<'_>], lower: &[String], begin: usize, un
         return String::new();
     }
     let piece = &all[last - 1];
-    name[all[first].start..piece.start + piece.text.len()].to_owned()
+    let end = piece.start + piece.text.len();
+    // "Wood (1)": the bracket belongs to what is in it.
+    let stem = &name[all[first].start..end];
+    let is_open = stem.rfind('(').is_some_and(|open| !stem[open..].contains(')'));
+    let end = if is_open && name[end..].starts_with(')') { end + 1 } else { end };
+    name[all[first].start..end].to_owned()
 }
 
 /// Blender's glTF exporter joins the names of what it packs: `wood_metallic-wood_roughness`, in glTF's channels.
@@ -738,6 +743,8 @@ mod tests {
             ("coat_base_color", "coat", Color, None),
             ("coat_ao", "coat", Occlusion, None),
             ("Fabric_ARM", "Fabric", Orm, None),
+            ("My Material (1) Normal", "My Material (1)", Normal, None),
+            ("My Material (old)_Roughness", "My Material (old)", Roughness, None),
         ];
         for (name, stem, role, green) in cases {
             let got = readings(name).swap_remove(0);

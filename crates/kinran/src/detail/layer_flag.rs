@@ -1,8 +1,11 @@
 //! A layer as one flag: `steel.png,scale=4,rotation=30,mask=rust.png,channel=g`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::{Vec2, vec2};
+use kinran_bake::folder::{Green, named_role};
+
+use crate::outputs::has_extension;
 
 /// What `--layer` says.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,13 +34,13 @@ pub struct LayerFlag {
     pub channel: usize,
     /// Of the mask.
     pub contrast: f32,
-    /// Green of a normal tile grows downwards.
+    /// Green of a normal tile grows downwards: as y-down and y-up say, else as the tile's name does.
     pub y_down: bool,
 }
 
 /// Names that a layer takes, for the message.
 const NAMES: &str =
-    "scale, rotation, offset, mirror, hue, saturation, value, opacity, mask, channel, contrast, y-down";
+    "scale, rotation, offset, mirror, hue, saturation, value, opacity, mask, channel, contrast, y-down, y-up";
 
 /// `FILE[,NAME=VALUE]...`
 pub(crate) fn layer_flag(text: &str) -> Result<LayerFlag, String> {
@@ -57,7 +60,7 @@ pub(crate) fn layer_flag(text: &str) -> Result<LayerFlag, String> {
         mask: None,
         channel: 0,
         contrast: 1.0,
-        y_down: false,
+        y_down: green_by_name(tile.as_ref()),
     };
     for part in parts {
         let (name, value) = part.split_once('=').unwrap_or((part, ""));
@@ -95,6 +98,7 @@ pub(crate) fn layer_flag(text: &str) -> Result<LayerFlag, String> {
             }
             "contrast" => layer.contrast = factor()?,
             "y-down" if value.is_empty() => layer.y_down = true,
+            "y-up" if value.is_empty() => layer.y_down = false,
             _ => return Err(format!("a layer knows no {part}; it takes {NAMES}")),
         }
     }
@@ -102,6 +106,12 @@ pub(crate) fn layer_flag(text: &str) -> Result<LayerFlag, String> {
         return Err("scale must not be zero".into());
     }
     Ok(layer)
+}
+
+/// Whether an authored normal map's green grows downwards by its name; baked ones are turned already.
+pub(super) fn green_by_name(file: &Path) -> bool {
+    let is_baked = has_extension(file, "ktx2") || has_extension(file, "dds");
+    !is_baked && named_role(file).and_then(|(_, green)| green) == Some(Green::Down)
 }
 
 /// `4` or `4x2`.
@@ -127,6 +137,20 @@ mod tests {
         assert_eq!((layer.scale, layer.offset, layer.rotation), (vec2(4.0, -2.0), Vec2::splat(0.5), 30.0));
         assert_eq!((layer.mirror, layer.channel, layer.contrast), (true, 1, 2.0));
         assert_eq!(layer.mask, Some("m.png".into()));
+    }
+
+    #[test]
+    fn a_name_that_says_directx_is_taken_for_up() {
+        for (text, down) in [
+            ("brick_nor_dx.png", true),
+            ("brick_nor_dx.png,y-up", false),
+            ("brick_nor_dx.png,y-down", true),
+            ("brick_nor_gl.png", false),
+            ("brick_normal.png,y-down", true),
+            ("brick_nor_dx.ktx2", false),
+        ] {
+            assert_eq!(layer_flag(text).unwrap().y_down, down, "{text}");
+        }
     }
 
     #[test]

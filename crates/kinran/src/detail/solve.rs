@@ -15,7 +15,7 @@ use kinran_image::{
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::layer_flag::layer_flag;
+use super::layer_flag::{green_by_name, layer_flag};
 use super::model::{self, Written, channels_flag};
 use super::{BlockFormat, KindName, KindSource, LayerFlag, default_format};
 use crate::bake::{Container, PresetName};
@@ -84,9 +84,13 @@ pub struct SolveArgs {
     #[arg(long, value_name = "0..1", default_value_t = 0.5, value_parser = |t: &str| number(t, 0.0..=1.0))]
     pub alpha: f32,
 
-    /// Green of a normal target grows downwards (DirectX)
-    #[arg(long)]
+    /// Green of a normal target grows downwards (DirectX); where no flag says it, the name does
+    #[arg(long, conflicts_with = "y_up")]
     pub y_down: bool,
+
+    /// Green of a normal target grows upwards (OpenGL, glTF), whatever its name says
+    #[arg(long)]
+    pub y_up: bool,
 
     /// Which layer of an EXR file holds the target, a tile or a mask; may be given again
     #[arg(long, value_name = "FILE=LAYER", value_parser = exr_layer)]
@@ -166,6 +170,11 @@ pub struct SolveArgs {
 }
 
 impl SolveArgs {
+    /// Whether green of a normal target grows downwards.
+    fn target_down(&self) -> bool {
+        self.y_down || (!self.y_up && green_by_name(&self.target))
+    }
+
     /// Where the files go.
     pub(super) fn output(&self) -> PathBuf {
         self.output.clone().unwrap_or_else(|| beside(&self.target, "baked"))
@@ -358,9 +367,9 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     }
     let mut warnings = layer_kinds(args, kind_name);
     if kind == MapKind::Normal {
-        warnings.extend(green_doubt(&args.target, &image, args.y_down, "--y-down"));
+        warnings.extend(green_doubt(&args.target, &image, args.target_down(), ["--y-down", "--y-up"]));
     }
-    let target = named(&args.target, Target::new(&image, kind, args.y_down))?;
+    let target = named(&args.target, Target::new(&image, kind, args.target_down()))?;
     drop(image);
     let tiles = read_tiles(args, kind, args.tile_format.unwrap_or(format), console, &mut warnings)?;
     let tile = |file: &Path, y_down: bool, is_mask: bool| &tiles[&(file.to_path_buf(), y_down, is_mask)];
@@ -514,7 +523,12 @@ fn read_tiles(
                 };
                 args.read(file).and_then(|image| {
                     if kind == MapKind::Normal {
-                        warnings.extend(green_doubt(file, &image, y_down, "y-down of the layer"));
+                        warnings.extend(green_doubt(
+                            file,
+                            &image,
+                            y_down,
+                            ["y-down of the layer", "y-up of the layer"],
+                        ));
                     }
                     let texels = u64::from(image.width) * u64::from(image.height) * 4 / 3;
                     let stage = console.progress().stage(format!("compressing {}", file_name(file)), texels);
@@ -548,22 +562,18 @@ fn layer_kinds(args: &SolveArgs, kind: KindName) -> Vec<String> {
     doubts.collect()
 }
 
-/// A sentence on normals whose green points the other way than is said, by their name or clearly by their slopes.
-fn green_doubt(file: &Path, image: &Image, y_down: bool, flag: &str) -> Option<String> {
+/// A sentence on normals whose slopes clearly say that green points the other way than a flag or their name does; `flags`
+/// say that it points down and up.
+fn green_doubt(file: &Path, image: &Image, y_down: bool, flags: [&str; 2]) -> Option<String> {
     let said = if y_down { Green::Down } else { Green::Up };
-    let name = named_role(file).and_then(|(_, green)| green);
-    let who = if name.is_some_and(|green| green != said) {
-        "its name says"
-    } else if name.is_none() && guess_green(image).contradicts(said) {
-        "its slopes say"
-    } else {
-        return None;
-    };
     let (way, fix) = match said {
-        Green::Up => ("down (DirectX)", "give"),
-        Green::Down => ("up (OpenGL)", "leave out"),
+        Green::Up => ("down (DirectX)", format!("give {}", flags[0])),
+        Green::Down if green_by_name(file) => ("up (OpenGL)", format!("give {}", flags[1])),
+        Green::Down => ("up (OpenGL)", format!("leave out {}", flags[0])),
     };
-    Some(format!("{}: {who} that green points {way}; then {fix} {flag}", file.display()))
+    guess_green(image)
+        .contradicts(said)
+        .then(|| format!("{}: its slopes say that green points {way}; then {fix}", file.display()))
 }
 
 /// An error that lacks a file's name gets it.
