@@ -1642,6 +1642,30 @@ fn red_of_a_coloured_map_is_taken_for_its_number_in_silence() {
     assert!(!told.iter().any(|note| note.contains("red is taken")), "{told:#?}");
 }
 
+/// CryEngine and others put gloss there.
+#[test]
+fn what_is_in_the_alpha_of_a_map_is_lost_in_silence() {
+    let with_alpha =
+        |alpha: f32| image(8, Channels::Rgba, move |u, _| [0.5, 0.5, 1.0, if u < 0.2 { alpha } else { 1.0 }]);
+    for (file, beside, alpha, wanted) in [
+        ("x_normal_gl.png", "x_roughness.png", 0.3, true),
+        ("x_normal_gl.png", "x_roughness.png", 1.0, false),
+        ("x_roughness.png", "x_ao.png", 0.3, true),
+        ("x_orm.png", "x_height.png", 0.3, true),
+        // There it is read.
+        ("x_color.png", "x_roughness.png", 0.3, false),
+        ("x_MetallicSmoothness.png", "x_ao.png", 0.3, false),
+        ("x_MaskMap.png", "x_height.png", 0.3, false),
+    ] {
+        let loaded =
+            load_one(&[(file, &with_alpha(alpha)), (beside, &grey(0.5))], &Hints::default()).unwrap();
+        let map = loaded.images.iter().find(|map| self::file(&map.path) == file).unwrap();
+        let told =
+            map.remarks.iter().any(|remark| remark.contains("alpha is not 1 everywhere and is not read"));
+        assert_eq!(told, wanted, "{file} with alpha {alpha}: {:?}", map.remarks);
+    }
+}
+
 #[test]
 fn normals_that_point_below_the_surface_are_turned_or_laid_on_it_in_silence() {
     let mut map = waves(Green::Up);

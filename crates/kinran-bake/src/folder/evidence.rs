@@ -229,6 +229,12 @@ pub fn colored(image: &Image) -> Option<String> {
         .then(|| format!("red, green and blue differ in {} of its texels", share_of(colored, image)))
 }
 
+/// Whether an image has an alpha that is not 1 everywhere.
+pub(super) fn has_alpha(image: &Image) -> bool {
+    let has_channel = matches!(image.channels, Channels::Rg | Channels::Rgba);
+    has_channel && count(image, |texel| texel[3] < 1.0 - OUTSIDE) > 0
+}
+
 /// How many of all texels `is_one` holds for.
 fn count(image: &Image, is_one: impl Fn(&[f32; 4]) -> bool + Sync) -> usize {
     let of_row = |y: u32| {

@@ -10,8 +10,8 @@ use kinran_shading::{alpha_from_roughness, alphas_from_khr_anisotropy};
 use rayon::prelude::*;
 
 use super::evidence::{
-    below_surface, colored, green_correlation, guess_by_correlation, is_grey, is_signed, not_normals,
-    odd_lengths, outside_unit,
+    below_surface, colored, green_correlation, guess_by_correlation, has_alpha, is_grey, is_signed,
+    not_normals, odd_lengths, outside_unit,
 };
 use super::{
     BaseRoughness, DirectionSource, FolderError, Green, GreenGuess, GreenSource, LevelSource, MapChannel,
@@ -71,12 +71,14 @@ impl MaterialMaps {
     /// Loads maps whose twins were compared; `known` are images that were read for that.
     fn load_settled(&self, known: Images, mut notes: Vec<String>) -> Result<LoadedMaterial, FolderError> {
         let paths: BTreeSet<&PathBuf> = self.files.iter().map(|(_, path)| path).collect();
-        let images: Images = (paths.into_par_iter())
+        let read: Vec<Result<(PathBuf, Arc<Image>), FolderError>> = (paths.into_par_iter())
             .map(|path| {
                 let image = known.get(path).cloned().map_or_else(|| self.image(path).map(Arc::new), Ok)?;
                 Ok((path.clone(), image))
             })
-            .collect::<Result<_, FolderError>>()?;
+            .collect();
+        // Of several errors the first file's, whichever was read first.
+        let images: Images = read.into_iter().collect::<Result<_, FolderError>>()?;
         drop(known);
         let loaded: Vec<LoadedMap> =
             (self.files.iter()).map(|(role, path)| self.loaded(*role, path, images[path].clone())).collect();
@@ -231,6 +233,13 @@ impl MaterialMaps {
                 remarks.push("sRGB by its file, which no data are; taken as stored".into())
             }
             _ => {}
+        }
+        let reads_alpha = role == Role::Color
+            || [Role::Gloss, Role::Roughness]
+                .iter()
+                .any(|quantity| role.packed_channel(*quantity) == Some(3));
+        if !reads_alpha && has_alpha(&image) {
+            remarks.push("its alpha is not 1 everywhere and is not read".into());
         }
         LoadedMap { role, path: path.into(), image, remarks }
     }
