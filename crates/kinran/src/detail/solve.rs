@@ -8,7 +8,7 @@ use kinran_bake::detail::{
     Comparison, DetailOptions, FADE_TRIALS, Layer, LayerTransform, LevelError, MapKind, Mask, Resolution,
     Solved, Target, Tile, TileOptions, bearable_opacity, compare, level_pictures, lowest_resolution, solve,
 };
-use kinran_bake::folder::{Green, guess_green, named_role, not_normals};
+use kinran_bake::folder::{Green, guess_green, not_normals};
 use kinran_image::{
     Image, encode_dds, encode_ktx2, encode_png, image_size, read_layer, read_texture, write_atomically,
 };
