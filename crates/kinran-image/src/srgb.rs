@@ -91,16 +91,16 @@ pub fn code_from_linear(v: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Codes and linear light of IEC 61966-2-1, worked out to ten digits elsewhere (NumPy, double precision).
+    /// Codes and linear light of IEC 61966-2-1, the latter the floats next to what NumPy gives in double precision.
     #[test]
     fn the_curve_is_off_at_known_values_or_its_joint() {
         for (code, linear) in [
             (0.0, 0.0),
             (0.02, 0.001_547_987_6),
-            (0.04045, 0.003_130_804_9),
-            (0.1, 0.010_022_825_6),
-            (0.5, 0.214_041_140_5),
-            (188.0 / 255.0, 0.502_886_458_0),
+            (0.04045, 0.003_130_805),
+            (0.1, 0.010_022_826),
+            (0.5, 0.214_041_14),
+            (188.0 / 255.0, 0.502_886_5),
             (1.0, 1.0),
         ] {
             let got = linear_from_srgb(code);
