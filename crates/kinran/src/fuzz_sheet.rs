@@ -13,7 +13,7 @@ use kinran_render::reference::{
     BoundTexture, MipTexture, RenderFuzz, RenderScene, Surroundings, TextureFiltering,
 };
 use kinran_scene::{Environment, Fuzz, FuzzAttenuation, FuzzLayer, Light, LightKind, Wrap};
-use kinran_shading::fuzz::fibre_direction;
+use kinran_shading::fuzz::{FUZZ_DEFERRED_ALBEDO, fibre_direction};
 use kinran_shading::sh::sh_evaluate;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -76,7 +76,7 @@ pub struct Args {
 
     /// Linear colour of the base under the fibres: velvet shows on a dark one. `own` leaves colour and roughness as the file
     /// has them
-    #[arg(long, value_name = "R,G,B|own", default_value = "0.03,0.006,0.01")]
+    #[arg(long, value_name = "R,G,B|own", default_value = DARK)]
     pub base: Base,
 
     /// Roughness of the base, which is no metal then [default: 0.8, the file's for --base own]
@@ -153,6 +153,9 @@ pub enum Direction {
     /// Azimuth turns in large swirls, as where velvet was crushed
     Swirl,
 }
+
+/// The default colour of the base; chosen by eye.
+const DARK: &str = "0.03,0.006,0.01";
 
 /// Roughness of a base whose colour is given; chosen by eye.
 const BASE_ROUGHNESS: f32 = 0.8;
@@ -280,6 +283,8 @@ struct Shot {
     view: View,
     /// A smooth metal takes the place of the base.
     gloss: bool,
+    /// The base's colour, where the sheet has one of its own.
+    base: Option<Vec3>,
     talk_ambient: bool,
 }
 
@@ -305,7 +310,14 @@ impl Studio<'_> {
     }
 
     fn shot(&self, name: impl Into<String>, fuzz: Option<Fuzz>) -> Shot {
-        Shot { name: name.into(), fuzz, view: self.parameters.clone(), gloss: false, talk_ambient: false }
+        Shot {
+            name: name.into(),
+            fuzz,
+            view: self.parameters.clone(),
+            gloss: false,
+            base: None,
+            talk_ambient: false,
+        }
     }
 
     fn shots(&self, sheet: Sheet) -> Vec<Shot> {
@@ -360,7 +372,10 @@ impl Studio<'_> {
             }
             Sheet::Simple => {
                 let simple = |fuzziness| Some(Fuzz::Simple { fuzziness, texture: None });
-                let shot = |f| self.shot(format!("fuzziness {f}"), simple(f));
+                // Fibres of this form have their colour from the base: they get the one that --color says.
+                let is_dark = DARK.parse().is_ok_and(|dark: Base| dark == self.args.base);
+                let base = is_dark.then(|| self.args.color / FUZZ_DEFERRED_ALBEDO);
+                let shot = |f| Shot { base, ..self.shot(format!("fuzziness {f}"), simple(f)) };
                 [0.0, 0.5, 1.0].into_iter().map(shot).collect()
             }
             Sheet::Realtime => Vec::new(),
@@ -438,6 +453,9 @@ impl Studio<'_> {
         });
         for material in &mut scene.materials {
             material.fuzz.clone_from(&fuzz);
+            if let Some(base) = shot.base {
+                material.base_color_factor = base.extend(material.base_color_factor.w);
+            }
             if shot.gloss {
                 // As smooth as shows a window's frame; chosen by eye.
                 (material.metallic_factor, material.roughness_factor) = (1.0, 0.2);

@@ -109,6 +109,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         let reason = "needs --backend gpu, which draws with shaders; add it, or leave the flag out";
         return Err(Error::flag_error(format!("--shaders {}", folder.display()), reason));
     }
+    if let Some(folder) = args.shaders.as_ref().filter(|folder| !folder.is_dir()) {
+        return Err(Error::file_error(folder, "there is no such folder; name one with .wgsl files"));
+    }
     let progress = console.progress();
     let painter = args.backend.open(args.shaders.as_deref(), &progress)?;
     let Model { path, scene, only_baked } = Model::open(&args.file, &args.view.model, &progress)?;

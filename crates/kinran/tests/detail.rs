@@ -236,6 +236,13 @@ fn normals_are_solved_as_colours_whatever_their_name_says() {
     let report = run(&words("wall.png", "brick.png", &[]));
     assert_eq!((&report["kind"], &report["kind_source"]), (&"color".into(), &"assumed".into()), "{report}");
 
+    for (flags, wanted) in [
+        (["--alpha", "0.3"], "--alpha has nothing to act on: the target is no aniso map"),
+        (["--channels", "orm"], "--channels has nothing to act on: neither --board nor --model is asked for"),
+    ] {
+        let told = warnings(&run(&words("Fabric_Normal.png", "tile_normal.png", &flags)));
+        assert!(told.contains(wanted), "wanted {wanted} in {told}");
+    }
     let told = warnings(&run(&words("Fabric_Normal.png", "tile_color.png", &[])));
     assert!(told.contains("tile_color.png: its name says color"), "{told}");
     let told = warnings(&run(&words("Dark_Normal.png", "tile_normal.png", &[])));

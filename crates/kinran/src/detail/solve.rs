@@ -81,7 +81,7 @@ pub struct SolveArgs {
     pub preset: Option<PresetName>,
 
     /// Opacity of the detail over an aniso target: the shader's parameter
-    #[arg(long, value_name = "0..1", default_value_t = 0.5, value_parser = |t: &str| number(t, 0.0..=1.0))]
+    #[arg(long, value_name = "0..1", default_value_t = ALPHA, value_parser = |t: &str| number(t, 0.0..=1.0))]
     pub alpha: f32,
 
     /// Green of a normal target grows downwards (DirectX); where no flag says it, the name does
@@ -204,6 +204,9 @@ impl SolveArgs {
         self.named_kind().0.into()
     }
 }
+
+/// The shader's default for the opacity of the detail over an aniso target; chosen by eye.
+const ALPHA: f32 = 0.5;
 
 /// What was solved and how well.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -366,6 +369,16 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
         return Err(Error::flag_error_of(&args.target, "--kind", reason));
     }
     let mut warnings = layer_kinds(args, kind_name);
+    let idle = [
+        ("--alpha", args.alpha != ALPHA && kind != MapKind::Aniso, "the target is no aniso map"),
+        (
+            "--channels",
+            args.channels.is_some() && !args.board && args.model.is_none(),
+            "neither --board nor --model is asked for",
+        ),
+    ];
+    let idle = idle.into_iter().filter(|(_, is_idle, _)| *is_idle);
+    warnings.extend(idle.map(|(flag, _, why)| format!("{flag} has nothing to act on: {why}")));
     if kind == MapKind::Normal {
         warnings.extend(green_doubt(&args.target, &image, args.target_down(), ["--y-down", "--y-up"]));
     }

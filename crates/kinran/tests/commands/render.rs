@@ -320,6 +320,27 @@ fn a_folder_of_baked_textures_is_laid_on_a_board() {
     refused(&["render", text(&maps), "-o", text(&out)], &["no .glb", "bake one"]);
 }
 
+/// Fibres that are lit from all sides of a dark base.
+#[test]
+fn the_simple_form_of_fuzz_changes_nothing_at_its_defaults() {
+    let (folder, model) = square();
+    let out = folder.path().join("fuzz");
+    let words = ["fuzz", text(&model), "-o", text(&out), "--sheet", "simple", "--size", "160", "--spp", "1"];
+    assert_eq!(kinran(&words).code, Some(0));
+    let sheet = read_image(&out.join("simple.png")).unwrap();
+    let (all, width) = (pixels(&sheet), sheet.width as usize);
+    // Pictures of 160 pixels and gaps of 10, under a line of labels; the last 100 rows have none.
+    let cell = |i: usize| {
+        let rows =
+            (sheet.height as usize - 120..sheet.height as usize - 20).map(move |y| y * width + 10 + 170 * i);
+        rows.flat_map(|at| all[at + 20..at + 140].to_vec()).collect::<Vec<_>>()
+    };
+    let [off, on] = [cell(0), cell(2)];
+    let apart =
+        off.iter().zip(&on).map(|(a, b)| f32::from(a[0].abs_diff(b[0]))).sum::<f32>() / off.len() as f32;
+    assert!(apart > 8.0, "a mean difference of {apart} steps of red between off and on");
+}
+
 #[test]
 fn a_folder_of_baked_colour_alone_is_refused() {
     let folder = tempfile::tempdir().unwrap();

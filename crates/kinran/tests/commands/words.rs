@@ -141,6 +141,9 @@ fn a_flag_for_maps_that_are_not_there_is_swallowed() {
     let model = folder.path().join("a.glb");
     let words = ["render", text(&model), "--shaders", text(folder.path())];
     refused(&words, &["--shaders", "needs --backend gpu"]);
+    let gone = folder.path().join("gone");
+    let words = ["render", text(&model), "--backend", "gpu", "--shaders", text(&gone)];
+    refused(&words, &["gone", "no such folder"]);
 }
 
 #[test]
