@@ -100,6 +100,7 @@ pub struct ViewArgs {
 
 impl ViewArgs {
     /// The layer of an environment's file that the flag names: that of the command line's file.
+    #[cfg(feature = "view")]
     pub(crate) fn layer_of(&self, choice: &EnvironmentChoice) -> Option<String> {
         self.exr_layer.clone().filter(|_| *choice == self.env)
     }
