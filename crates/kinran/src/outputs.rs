@@ -288,7 +288,7 @@ pub(crate) fn kept_remark(kept: &[WrittenFile]) -> String {
     };
     match names.len() {
         0 => String::new(),
-        _ => format!("of an earlier run with other flags, no longer in use: {}{more}\n", names.join(", ")),
+        _ => format!("of an earlier run with other flags, left as they are: {}{more}\n", names.join(", ")),
     }
 }
 
