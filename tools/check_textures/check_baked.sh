@@ -13,7 +13,7 @@ rm -rf "$work/painted" "$work/baked"
 mkdir -p "$work/painted"
 python=$work/venv/bin/python
 "$python" "$here/check_baked.py" paint "$work/painted"
-kinran=(cargo run --quiet --release --locked --manifest-path "$root/Cargo.toml" -p kinran --)
+kinran=(cargo run --quiet --release --locked --manifest-path "$root/Cargo.toml" -p kinran-cli --)
 [ -z "${KINRAN_BUILT:-}" ] || kinran=("$KINRAN_BUILT/kinran")
 "${kinran[@]}" --quiet bake "$work/painted" -o "$work/baked" --form both --container both
 cp "$here/read_ktx2.mjs" "$work/"

@@ -177,7 +177,7 @@ fn a_file_that_kinran_writes_is_refused_by_inspect() {
         }
     }
     let all: std::collections::BTreeSet<String> =
-        kinran::content::Content::ALL.into_iter().map(|content| content.name().to_owned()).collect();
+        kinran_cli::content::Content::ALL.into_iter().map(|content| content.name().to_owned()).collect();
     let missing: Vec<&String> = all.difference(&roles).filter(|role| *role != "data").collect();
     assert!(missing.is_empty(), "no run wrote {missing:?}");
 }

@@ -182,7 +182,7 @@ fn do_command(command: &Command, console: &Console) -> Result<(), Error> {
         Command::View(args) => viewer::run(args, console),
         #[cfg(not(feature = "view"))]
         Command::View(_) => Err(Error::Usage(
-            "view: this kinran was built without a window; build it with `cargo build --release -p kinran --features \
+            "view: this kinran was built without a window; build it with `cargo build --release -p kinran-cli --features \
              view`, or use `kinran render`"
                 .into(),
         )),

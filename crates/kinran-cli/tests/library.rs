@@ -948,7 +948,7 @@ fn the_same_version_bakes_other_bytes_under_the_same_keys() {
     assert_eq!(
         hasher.finalize().to_hex().as_str(),
         GOLDEN,
-        "the bytes changed: raise BYTES_VERSION in crates/kinran/src/bake/library/inputs.rs and put the hash on the \
+        "the bytes changed: raise BYTES_VERSION in crates/kinran-cli/src/bake/library/inputs.rs and put the hash on the \
          left here"
     );
 }

@@ -52,7 +52,7 @@ impl Backend {
             #[cfg(not(feature = "gpu"))]
             Backend::Gpu => Err(Error::flag_error(
                 "--backend gpu",
-                "this kinran was built without a GPU renderer; build it with `cargo build --release -p kinran --features \
+                "this kinran was built without a GPU renderer; build it with `cargo build --release -p kinran-cli --features \
                  gpu`, or use --backend cpu",
             )),
         }

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     clean_up_when_interrupted();
-    kinran::cli::run(std::env::args_os())
+    kinran_cli::cli::run(std::env::args_os())
 }
 
 /// From now on Ctrl-C, and on Unix a polite kill, leave nothing unfinished behind. Where no handler can be had the next

@@ -24,11 +24,11 @@ fn materials() -> tempfile::TempDir {
     folder
 }
 
-/// `KINRAN_WRITE_SCHEMAS=1 cargo test --release -p kinran --all-features --test commands schemas` writes them.
+/// `KINRAN_WRITE_SCHEMAS=1 cargo test --release -p kinran-cli --all-features --test commands schemas` writes them.
 #[test]
 fn schemas_in_docs_are_those_of_the_reports() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/schema/json");
-    for (name, schema) in kinran::schemas() {
+    for (name, schema) in kinran_cli::schemas() {
         let path = folder.join(format!("{name}.schema.json"));
         let wanted = serde_json::to_string_pretty(&schema).unwrap() + "\n";
         if std::env::var_os("KINRAN_WRITE_SCHEMAS").is_some() {
@@ -201,7 +201,7 @@ fn error_of(folder: &Path, args: &[&str]) -> Value {
 #[test]
 fn a_value_that_is_none_is_told_without_its_flag() {
     let folder = tempfile::tempdir().unwrap();
-    let program = kinran::cli::command();
+    let program = kinran_cli::cli::command();
     let mut all = Vec::new();
     commands(&program, &[], &mut all);
     let is_path = |flag: &clap::Arg| {
@@ -348,7 +348,7 @@ fn a_file_or_flag_is_told_in_words_alone() {
         let [got_file, got_flag] = ["file", "flag"].map(|key| error[key].as_str().unwrap_or(""));
         assert_eq!((got_file, got_flag), (file, flag), "{args:?}: {error}");
     }
-    for command in kinran::cli::command().get_subcommands() {
+    for command in kinran_cli::cli::command().get_subcommands() {
         let name = command.get_name();
         assert!(commands_tried.contains(name) || name == "view", "no error of {name} was tried");
     }

@@ -25,7 +25,7 @@ fn help(path: &[String], flag: &str, width: usize) -> String {
 #[test]
 fn help_can_be_read_at_any_width() {
     let mut all = Vec::new();
-    paths(&kinran::cli::command(), &[], &mut all);
+    paths(&kinran_cli::cli::command(), &[], &mut all);
     assert!(all.len() > 15, "only {} commands", all.len());
     // Without the window there is no help about it.
     all.retain(|path| cfg!(feature = "view") || path != &["view"]);
@@ -54,7 +54,7 @@ fn examples_stand_in_help_line_by_line() {
         }
         command.get_subcommands().for_each(|c| walk(c, &[path, &[c.get_name().to_owned()]].concat()));
     }
-    walk(&kinran::cli::command(), &[]);
+    walk(&kinran_cli::cli::command(), &[]);
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn completions_and_manual_pages_know_every_command() {
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let script = crate::common::kinran(&["completions", shell]);
         assert_eq!(script.code, Some(0), "{}", script.err);
-        for command in kinran::cli::command().get_subcommands() {
+        for command in kinran_cli::cli::command().get_subcommands() {
             let name = command.get_name();
             assert!(script.out.contains(name), "{shell}: {name} is missing");
             assert!(pages.contains(&format!("kinran-{name}.1")), "{name}: {pages:?}");

@@ -225,8 +225,8 @@ fn a_bake_keeps_fuzz_and_leaves_a_sheen_for_others() {
 #[test]
 fn between_the_tilts_of_a_fit_its_error_stays_within_what_is_stated() {
     use glam::DVec3;
-    use kinran::Progress;
-    use kinran::surfaces::fuzz_fits;
+    use kinran_cli::Progress;
+    use kinran_cli::surfaces::fuzz_fits;
     use kinran_bake::fuzz_fit::{Fibres, Phase};
     use kinran_scene::FuzzPhase;
     use kinran_shading::fuzz::{fuzz_alpha, fuzz_g};
@@ -271,8 +271,8 @@ fn between_the_tilts_of_a_fit_its_error_stays_within_what_is_stated() {
 mod realtime {
     use crate::sample_assets::sample_assets;
     use glam::{Affine3A, Vec3, vec2, vec3};
-    use kinran::Progress;
-    use kinran::surfaces::fuzz_fits;
+    use kinran_cli::Progress;
+    use kinran_cli::surfaces::fuzz_fits;
     use kinran_render::metrics::flip;
     use kinran_render::realtime::{Gpu, Realtime, Settings as GpuSettings, ShaderSource};
     use kinran_render::reference::{Background, RenderScene, Settings, TextureFiltering, look_at, render};
