@@ -4,7 +4,7 @@
 
 use kinran_bake::aniso::{Kernel, footprints};
 use kinran_bake::plain_levels;
-use kinran_image::{Channels, Image, Pixels, Transfer, full_level_count};
+use kinran_image::{Channels, Image, Pixels, Transfer, full_level_count, untold};
 use kinran_scene::Wrap;
 use libfuzzer_sys::fuzz_target;
 
@@ -27,7 +27,8 @@ fuzz_target!(|input: (u8, u8, bool, u8, Vec<u8>)| {
     let wrap = [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror][usize::from(wrap) % 3];
     let samples: Vec<u8> = bytes.iter().copied().cycle().take((width * height) as usize).collect();
     let image = Image::new(width, height, Channels::R, Pixels::U8(samples.clone())).expect("a sound image");
-    let levels = plain_levels(&image, (width, height), Transfer::Srgb, kernel, [wrap; 2]);
+    let levels = plain_levels(&image, (width, height), Transfer::Srgb, kernel, [wrap; 2], &untold);
+    let levels = levels.expect("nobody stops it");
     let count = full_level_count(width, height);
     let (columns, rows) = (footprints(width, count, kernel, wrap), footprints(height, count, kernel, wrap));
     for level in 1..count {

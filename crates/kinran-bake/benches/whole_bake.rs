@@ -13,7 +13,7 @@ use std::time::Instant;
 use kinran_bake::aniso::{Filter, Kernel, Sheet, SheetRequest, SurfaceOptions, bake_surface};
 use kinran_bake::folder::{Hints, LoadedMaterial, scan};
 use kinran_image::{
-    Channels, Format, Image, Pixels, Role, Texture, encode_ktx2, encode_parallel, read_image,
+    Channels, Format, Image, Pixels, Role, Texture, encode_ktx2, encode_parallel, read_image, untold,
     write_atomically, write_png,
 };
 use rayon::prelude::*;
@@ -110,7 +110,7 @@ fn load(folder: &Path) -> LoadedMaterial {
 fn bake(loaded: &LoadedMaterial, filter: Filter, sheets: &[SheetRequest]) -> Vec<Texture> {
     let maps = loaded.surface.as_ref().expect("a surface");
     let options = SurfaceOptions { filter, kernel: Kernel::Box };
-    bake_surface(maps, options, sheets, &|_| {}).expect("baked").textures
+    bake_surface(maps, options, sheets, &untold).expect("baked").textures
 }
 
 /// What the encoders get, level by level: the same bake without compression.

@@ -13,12 +13,12 @@
 //!
 //! ```
 //! use kinran_bake::{aniso::Kernel, plain_levels};
-//! use kinran_image::{Channels, Image, Pixels, Transfer};
+//! use kinran_image::{Channels, Image, Pixels, Transfer, untold};
 //! use kinran_scene::Wrap;
 //!
 //! // Black and white average to half the light, which is code 188.
 //! let chequer = Image::new(2, 2, Channels::R, Pixels::U8(vec![0, 255, 255, 0]))?;
-//! let levels = plain_levels(&chequer, (2, 2), Transfer::Srgb, Kernel::Box, [Wrap::Repeat; 2]);
+//! let levels = plain_levels(&chequer, (2, 2), Transfer::Srgb, Kernel::Box, [Wrap::Repeat; 2], &untold)?;
 //! assert_eq!(levels[1].rgba8, [188, 188, 188, 255]);
 //! # Ok::<(), kinran_image::Error>(())
 //! ```
@@ -34,6 +34,7 @@ pub mod manifest;
 mod material;
 mod mips;
 mod patterns;
+mod pieces;
 mod simd;
 pub mod skin_lut;
 pub mod stamps;

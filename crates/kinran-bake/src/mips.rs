@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use kinran_image::srgb::{linear_from_srgb, srgb_from_linear};
 use kinran_image::{
-    Channels, Encoding, Error, Image, Level, Pixels, Texture, Transfer, encode_parallel, full_level_count,
-    level_size,
+    Cancelled, Channels, Encoding, Error, Image, Level, Pixels, Texture, Tick, Transfer, encode_parallel,
+    full_level_count, level_size,
 };
 use kinran_scene::Wrap;
 
@@ -58,14 +58,15 @@ const PASS_LEVELS: usize = 3;
 
 /// Averages level 0 down to 1×1 and hands every band of levels 1 and up to `consume`, in parallel; returns
 /// what it returned, in order, per level. Every level is an average of level 0 alone, in floats, whatever
-/// the number of threads. `consume` may keep memory from one band to the next.
-pub(crate) fn reduce_levels<R: PlaneRows, T: Send, M: Default>(
+/// the number of threads. `consume` may keep memory from one band to the next; no band is begun after its first error,
+/// which is given back.
+pub(crate) fn reduce_levels<R: PlaneRows, T: Send, E: Send, M: Default>(
     source: &R,
     size: (u32, u32),
     kernel: Kernel,
     wrap: [Wrap; 2],
-    consume: impl Fn(PlaneBand, &mut M) -> T + Sync,
-) -> Vec<Vec<T>> {
+    consume: impl Fn(PlaneBand, &mut M) -> Result<T, E> + Sync,
+) -> Result<Vec<Vec<T>>, E> {
     let steps: Vec<Step> =
         (1..full_level_count(size.0, size.1)).map(|level| Step::new(size, level, kernel, wrap)).collect();
     let mut results: Vec<Vec<T>> = steps.iter().map(|_| Vec::new()).collect();
@@ -90,18 +91,18 @@ pub(crate) fn reduce_levels<R: PlaneRows, T: Send, M: Default>(
                 || (vec![0.0; room], M::default()),
                 |(room, memory), (i, samples)| {
                     let mut made: Vec<Vec<T>> = pass.steps.iter().map(|_| Vec::new()).collect();
-                    pass.make_band(more, i, samples, room, memory, &mut made);
-                    made
+                    pass.make_band(more, i, samples, room, memory, &mut made)?;
+                    Ok(made)
                 },
             )
-            .collect();
+            .collect::<Result<_, E>>()?;
         for (level, made) in bands.into_iter().flat_map(|made| made.into_iter().enumerate()) {
             results[first + level].extend(made);
         }
         finer = coarse;
         first += more + 1;
     }
-    results
+    Ok(results)
 }
 
 /// How a level follows from the one before.
@@ -164,7 +165,7 @@ struct Pass<'a, R, C> {
 impl<R: PlaneRows, C> Pass<'_, R, C> {
     /// Makes and hands on band `i` of level `depth` of the pass, after the bands under it; `room` is for one
     /// band of each of their levels.
-    fn make_band<T, M>(
+    fn make_band<T, E, M>(
         &self,
         depth: usize,
         i: usize,
@@ -172,8 +173,9 @@ impl<R: PlaneRows, C> Pass<'_, R, C> {
         room: &mut [f32],
         memory: &mut M,
         made: &mut [Vec<T>],
-    ) where
-        C: Fn(PlaneBand, &mut M) -> T,
+    ) -> Result<(), E>
+    where
+        C: Fn(PlaneBand, &mut M) -> Result<T, E>,
     {
         let step = &self.steps[depth];
         let (y0, row_len) = (i * BAND_ROWS as usize, step.row_len::<R>());
@@ -189,14 +191,15 @@ impl<R: PlaneRows, C> Pass<'_, R, C> {
                 (2 * i..).zip(rows.chunks(half).zip(samples.chunks_mut(half * row_len)))
             {
                 let band = &mut band[..2 * rows.len() * finer_len];
-                self.make_band(depth - 1, j, band, room, memory, made);
+                self.make_band(depth - 1, j, band, room, memory, made)?;
                 let source = Finer::<R>::Samples(band);
                 let first_row = j * BAND_ROWS as usize;
                 dispatch(ReduceBand { source, first_row, step, rows, coarse });
             }
         }
         let band = PlaneBand { level: step.level, width: step.columns.len(), y0, rows: rows.len(), samples };
-        made[depth].push((self.consume)(band, memory));
+        made[depth].push((self.consume)(band, memory)?);
+        Ok(())
     }
 }
 
@@ -339,22 +342,30 @@ pub struct Rgba8Level {
 
 /// The mip chain of an image that needs no filter of its own, at level-0 size `size` (enlarged bilinearly
 /// where the image is smaller). Averages are taken in linear light and rounded once, from floats. `transfer` is that of
-/// the levels; with [`Transfer::Srgb`] the image is colour, encoded as it says itself ([`Image::transfer`]).
+/// the levels; with [`Transfer::Srgb`] the image is colour, encoded as it says itself ([`Image::transfer`]). `tick` is told
+/// of texels of all levels.
+///
+/// # Errors
+/// Where `tick` stops the work.
 pub fn plain_levels(
     image: &Image,
     size: (u32, u32),
     transfer: Transfer,
     kernel: Kernel,
     wrap: [Wrap; 2],
-) -> Vec<Rgba8Level> {
+    tick: &Tick<'_>,
+) -> Result<Vec<Rgba8Level>, Cancelled> {
     let source = ImagePlanes { image, transfer, size, wrap };
     let width = size.0 as usize;
     let mut finest = vec![0; width * size.1 as usize * 4];
-    finest.par_chunks_mut(width * 4).enumerate().for_each(|(y, row)| {
+    finest.par_chunks_mut(BAND_ROWS as usize * width * 4).enumerate().try_for_each(|(i, band)| {
         let mut planes = vec![0.0; width * 4];
-        source.row(y as u32, 0, planes.chunks_exact_mut(width));
-        quantise_row(&planes, transfer, row);
-    });
+        for (row, y) in band.chunks_exact_mut(width * 4).zip(i as u32 * BAND_ROWS..) {
+            source.row(y, 0, planes.chunks_exact_mut(width));
+            quantise_row(&planes, transfer, row);
+        }
+        tick(band.len() as u64 / 4)
+    })?;
     let bands = reduce_levels(&source, size, kernel, wrap, |band, (): &mut ()| {
         let mut bytes = vec![0; band.width * band.rows * 4];
         for (row, out) in
@@ -362,18 +373,16 @@ pub fn plain_levels(
         {
             quantise_row(row, transfer, out);
         }
-        bytes
-    });
+        tick(bytes.len() as u64 / 4)?;
+        Ok::<_, Cancelled>(bytes)
+    })?;
     let coarser = bands.into_iter().map(|bands| bands.concat());
-    std::iter::once(finest)
-        .chain(coarser)
-        .enumerate()
-        .map(|(level, rgba8)| Rgba8Level {
-            width: level_size(size.0, level),
-            height: level_size(size.1, level),
-            rgba8,
-        })
-        .collect()
+    let levels = std::iter::once(finest).chain(coarser).enumerate().map(|(level, rgba8)| Rgba8Level {
+        width: level_size(size.0, level),
+        height: level_size(size.1, level),
+        rgba8,
+    });
+    Ok(levels.collect())
 }
 
 /// One 8-bit image out of channels of others, enlarged to `size` bilinearly where they are smaller; `otherwise`
@@ -403,20 +412,20 @@ pub fn pack_channels(
 /// Rows that are compressed at a time.
 const STRIP_ROWS: usize = 256;
 
-/// The mip chain of an image that needs no filter of its own, compressed. `transfer` as for [`plain_levels`]; `progress` is
-/// told of texels that are done.
+/// The mip chain of an image that needs no filter of its own, compressed. `transfer` as for [`plain_levels`]; `tick` is
+/// told of texels of all levels that are compressed.
 ///
 /// # Errors
-/// [`Error::Unsupported`] where the encoder refuses.
+/// [`Error::Unsupported`] where the encoder refuses, [`Error::Cancelled`] where `tick` does.
 pub fn bake_plain(
     image: &Image,
     transfer: Transfer,
     encoding: Encoding,
     kernel: Kernel,
     wrap: [Wrap; 2],
-    progress: &(dyn Fn(u64) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<Texture, Error> {
-    let levels = plain_levels(image, (image.width, image.height), transfer, kernel, wrap)
+    let levels = plain_levels(image, (image.width, image.height), transfer, kernel, wrap, &|_| tick(0))?
         .into_iter()
         .map(|level| {
             let mut data = Vec::with_capacity(encoding.format.level_bytes(level.width, level.height));
@@ -424,7 +433,7 @@ pub fn bake_plain(
             for strip in level.rgba8.chunks(STRIP_ROWS * row) {
                 let rows = (strip.len() / row) as u32;
                 data.extend(encode_parallel(encoding, strip, level.width, rows)?);
-                progress(u64::from(level.width) * u64::from(rows));
+                tick(u64::from(level.width) * u64::from(rows))?;
             }
             Ok(Level { width: level.width, height: level.height, data })
         })

@@ -20,7 +20,7 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use glam::{Vec2, Vec3, vec2, vec3};
-    use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Transfer};
+    use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Transfer, untold};
     use kinran_scene::Wrap;
 
     use super::*;
@@ -128,7 +128,7 @@ mod tests {
         for filter in Filter::ALL {
             for kernel in [Kernel::Box, Kernel::Tent] {
                 let options = SurfaceOptions { filter, kernel };
-                let Ok(baked) = bake_surface(&maps, options, &requests, &|_| {}) else {
+                let Ok(baked) = bake_surface(&maps, options, &requests, &untold) else {
                     assert_eq!((filter, kernel), (Filter::Param, Kernel::Box), "only param has one kernel");
                     continue;
                 };
@@ -139,7 +139,8 @@ mod tests {
             }
         }
         for transfer in [Transfer::Srgb, Transfer::Linear] {
-            let levels = plain_levels(&packed, SIZE, transfer, Kernel::Tent, [Wrap::Clamp; 2]);
+            let levels =
+                plain_levels(&packed, SIZE, transfer, Kernel::Tent, [Wrap::Clamp; 2], &untold).unwrap();
             let bytes = levels.into_iter().flat_map(|level| level.rgba8).collect();
             results.push((format!("plain levels, {transfer:?}"), bytes));
         }
@@ -194,7 +195,7 @@ mod tests {
         let mesh = Mesh { positions: &positions, normals: None, tangents: None, triangles: &triangles };
         for method in [Method::Normals, Method::Fit] {
             let options = Options { method, millimetres: 100.0, ..Options::default() };
-            let baked = bake_curvature(&mesh, &options, &|_| {}).unwrap();
+            let baked = bake_curvature(&mesh, &options, &untold).unwrap();
             results.push((format!("curvature, {method:?}"), format!("{:?}", baked.tensors).into()));
         }
 

@@ -4,7 +4,7 @@
 //! use kinran_bake::skin_lut::{Profile, TableFormat, punctual_table};
 //!
 //! let burley = Profile::Burley([1.2, 0.5, 0.3]);
-//! let table = punctual_table(burley.radial()?, 32, 8, 0.5, &|_| {});
+//! let table = punctual_table(burley.radial()?, 32, 8, 0.5, &kinran_image::untold)?;
 //! let texture = table.texture(TableFormat::Rgba16F)?;
 //! assert!(table.texture_error(&texture)? < 1e-3);
 //! // At the terminator, bent as a nose is: red light has come around.
@@ -13,11 +13,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use kinran_image::{Error, Format, Level, Texture, Transfer, encode_half};
+use kinran_image::{Cancelled, Error, Format, Level, Texture, Tick, Transfer, encode_half};
 use kinran_shading::skin::profile::{Gaussian, LinearProfile, ProfileError, RadialProfile};
 use kinran_shading::skin::sampled::Sample;
 use rayon::prelude::*;
 
+use crate::pieces::Pieces;
 use crate::srgb_from_linear;
 
 /// A diffusion profile that owns its numbers.
@@ -79,32 +80,33 @@ pub struct Table {
 }
 
 /// What part of a punctual light's irradiance at normal incidence leaves skin: columns are n·u from -1 to 1, rows
-/// are curvature from 0 to `range` (1/mm), both at the middles of texels. Clamped, linear sampling reads it right. `progress` is
-/// told of texels that are done.
+/// are curvature from 0 to `range` (1/mm), both at the middles of texels. Clamped, linear sampling reads it right. `tick` is told
+/// of texels of the table.
+///
+/// # Errors
+/// Where `tick` stops the work.
 pub fn punctual_table(
     profile: RadialProfile<'_>,
     width: usize,
     height: usize,
     range: f64,
-    progress: &(dyn Fn(u64) + Sync),
-) -> Table {
+    tick: &Tick<'_>,
+) -> Result<Table, Cancelled> {
     if let Some(lengths) = profile.burley_lengths() {
-        let table = burley_table(lengths, width, height, range);
-        progress((width * height) as u64);
-        return table;
+        return burley_table(lengths, width, height, range, tick);
     }
     let mut samples = Vec::new();
     let linear = sampled(profile, &mut samples);
     let mut entries = vec![[0.0f32; 3]; width * height];
-    entries.par_chunks_mut(width).enumerate().for_each(|(row, entries)| {
+    entries.par_chunks_mut(width).enumerate().try_for_each(|(row, entries)| {
         let mut exact = vec![[0.0; 3]; width];
         linear.ring_row((row as f64 + 0.5) / height as f64 * range, &mut exact);
         for (entry, exact) in entries.iter_mut().zip(exact) {
             *entry = exact.map(|x| x as f32);
         }
-        progress(width as u64);
-    });
-    Table { width, height, entries }
+        tick(width as u64)
+    })?;
+    Ok(Table { width, height, entries })
 }
 
 /// Steps of ln(d curvature) between the rows that [`burley_table`] computes. Interpolation through six of them is within
@@ -114,14 +116,21 @@ const STEP: f64 = 0.2;
 /// [`punctual_table`] for Burley's profile. A row depends on the product of d and curvature alone, smoothly on its logarithm:
 /// rows for products in equal steps, three at a time as if they were channels, and every channel of every row of the table
 /// between six of them.
-fn burley_table(lengths: [f64; 3], width: usize, height: usize, range: f64) -> Table {
+fn burley_table(
+    lengths: [f64; 3],
+    width: usize,
+    height: usize,
+    range: f64,
+    tick: &Tick<'_>,
+) -> Result<Table, Cancelled> {
     let curvature = |row: usize| (row as f64 + 0.5) / height as f64 * range;
     let shortest = lengths.iter().copied().fold(f64::INFINITY, f64::min);
     let longest = lengths.iter().copied().fold(0.0, f64::max);
     let first = libm::log(shortest * curvature(0)) - 2.5 * STEP;
     let last = libm::log(longest * curvature(height - 1)) + 2.5 * STEP;
     let triples = ((last - first) / STEP + 1.0).ceil() as usize / 3 + 1;
-    let exact: Vec<Vec<[f64; 3]>> = (0..triples)
+    let pieces = Pieces::new(tick, (width * height) as u64, triples);
+    let exact = (0..triples)
         .into_par_iter()
         .map(|triple| {
             let d = std::array::from_fn(|i| libm::exp(first + STEP * (3 * triple + i) as f64));
@@ -130,9 +139,10 @@ fn burley_table(lengths: [f64; 3], width: usize, height: usize, range: f64) -> T
             if let Ok(profile) = RadialProfile::burley(d) {
                 profile.to_linear().ring_row(1.0, &mut row);
             }
-            row
+            pieces.done()?;
+            Ok(row)
         })
-        .collect();
+        .collect::<Result<Vec<_>, Cancelled>>()?;
 
     let mut entries = vec![[0.0f32; 3]; width * height];
     entries.par_chunks_mut(width).enumerate().for_each(|(row, entries)| {
@@ -147,7 +157,7 @@ fn burley_table(lengths: [f64; 3], width: usize, height: usize, range: f64) -> T
             }
         }
     });
-    Table { width, height, entries }
+    Ok(Table { width, height, entries })
 }
 
 /// Lagrange's polynomial of the places 0 to 5 that is one at `place`.
@@ -267,14 +277,17 @@ impl Table {
 /// Points along each side of a texel at which [`punctual_interpolation_error`] looks.
 pub const INTERPOLATION_GRID: usize = 4;
 
-/// The largest error of reading a punctual table between its texels, on a grid [`INTERPOLATION_GRID`] times as fine. `progress`
-/// is told of points of the grid that are done.
+/// The largest error of reading a punctual table between its texels, on a grid [`INTERPOLATION_GRID`] times as fine. `tick`
+/// is told of points of the grid.
+///
+/// # Errors
+/// Where `tick` stops the work.
 pub fn punctual_interpolation_error(
     profile: RadialProfile<'_>,
     table: &Table,
     range: f64,
-    progress: &(dyn Fn(u64) + Sync),
-) -> f32 {
+    tick: &Tick<'_>,
+) -> Result<f32, Cancelled> {
     let mut samples = Vec::new();
     let linear = sampled(profile, &mut samples);
     let (columns, rows) = (INTERPOLATION_GRID * table.width, INTERPOLATION_GRID * table.height);
@@ -290,10 +303,10 @@ pub fn punctual_interpolation_error(
                 let read = table.sample(u as f32, v as f32);
                 (0..3).for_each(|c| worst = worst.max((exact[c] as f32 - read[c]).abs()));
             }
-            progress(columns as u64);
-            worst
+            tick(columns as u64)?;
+            Ok(worst)
         })
-        .reduce(|| 0.0, f32::max)
+        .try_reduce(|| 0.0, |a, b| Ok(a.max(b)))
 }
 
 #[cfg(test)]
@@ -306,7 +319,7 @@ mod tests {
         for (lengths, range) in [([0.9, 0.4, 0.2], 0.5), ([3.0, 0.05, 0.7], 2.0)] {
             let radial = RadialProfile::burley(lengths).unwrap();
             let (width, height) = (64, 40);
-            let table = punctual_table(radial, width, height, range, &|_| {});
+            let table = punctual_table(radial, width, height, range, &kinran_image::untold).unwrap();
             let mut worst = (0.0f64, 0);
             for row in 0..height {
                 let mut exact = vec![[0.0; 3]; width];

@@ -4,6 +4,7 @@ mod shapes;
 
 use glam::{Mat3, Vec3, Vec4, dvec3};
 use kinran_bake::curvature::{Curvature, CurvatureError, Mesh, Method, Options, bake_curvature, principal};
+use kinran_image::untold;
 use kinran_shading::Sym2;
 use shapes::{Noise, Shape, cylinder, ellipsoid, saddle, sphere, torus};
 
@@ -19,7 +20,7 @@ fn bake(shape: &Shape, with_normals: bool, options: &Options) -> Curvature {
         tangents: None,
         triangles: &shape.triangles,
     };
-    bake_curvature(&mesh, options, &|_| {}).expect("a sound mesh")
+    bake_curvature(&mesh, options, &untold).expect("a sound mesh")
 }
 
 /// The larger of both principal curvatures' errors at every inner vertex, sorted.
@@ -241,7 +242,7 @@ fn tensors_stand_in_the_mesh_s_own_tangent_frame() {
             tangents: Some(&tangents),
             triangles: &shape.triangles,
         };
-        let baked = bake_curvature(&mesh, &raw(method), &|_| {}).unwrap();
+        let baked = bake_curvature(&mesh, &raw(method), &untold).unwrap();
         for (i, tensor) in baked.tensors.iter().enumerate() {
             let n = shape.normals[i];
             let t = tangents[i].truncate();
@@ -446,7 +447,7 @@ fn bad_meshes_are_refused_with_a_reason() {
     let shape = sphere(4, 1.0, 0.0);
     let refused =
         |positions: &[Vec3], normals: Option<&[Vec3]>, triangles: &[[u32; 3]], options: &Options| {
-            bake_curvature(&Mesh { positions, normals, tangents: None, triangles }, options, &|_| {})
+            bake_curvature(&Mesh { positions, normals, tangents: None, triangles }, options, &untold)
                 .unwrap_err()
         };
     let options = Options::default();

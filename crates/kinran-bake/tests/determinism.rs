@@ -9,7 +9,7 @@ use kinran_bake::aniso::{
     DirectionMap, Filter, Kernel, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps,
     SurfaceOptions, bake_surface,
 };
-use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Texture};
+use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Texture, untold};
 use kinran_scene::Wrap;
 
 fn noise(seed: u64, width: u32, height: u32) -> Arc<Image> {
@@ -60,7 +60,7 @@ fn bytes_depend_on_the_number_of_threads() {
             let bake = |threads: usize| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let options = SurfaceOptions { filter, kernel };
-                pool.install(|| bake_surface(&maps(70, 50), options, &requests(encoder, &packed), &|_| {}))
+                pool.install(|| bake_surface(&maps(70, 50), options, &requests(encoder, &packed), &untold))
                     .unwrap()
             };
             let one = bake(1);
@@ -103,7 +103,7 @@ fn a_row_depends_on_rows_below_its_footprint() {
     for filter in Filter::ALL {
         let options = SurfaceOptions { filter, kernel: Kernel::Box };
         let bake = |maps: &SurfaceMaps, packed: &Image| -> Vec<Texture> {
-            bake_surface(maps, options, &requests(Encoder::Portable, packed), &|_| {}).unwrap().textures
+            bake_surface(maps, options, &requests(Encoder::Portable, packed), &untold).unwrap().textures
         };
         for (whole, part) in bake(&all, &packed).iter().zip(bake(&upper, &upper_packed)) {
             // Whole rows of blocks, down to levels that are one block high.
@@ -115,23 +115,4 @@ fn a_row_depends_on_rows_below_its_footprint() {
             }
         }
     }
-}
-
-/// `progress` is told of every texel once.
-#[test]
-fn progress_ends_short_of_the_end() {
-    use std::sync::atomic::{AtomicU64, Ordering};
-    let packed = noise(9, 70, 50);
-    let told = AtomicU64::new(0);
-    let baked = bake_surface(
-        &maps(70, 50),
-        SurfaceOptions::default(),
-        &requests(Encoder::Portable, &packed),
-        &|texels| {
-            told.fetch_add(texels, Ordering::Relaxed);
-        },
-    )
-    .unwrap();
-    let wanted: u64 = baked.levels.iter().map(|l| u64::from(l.width) * u64::from(l.height)).sum();
-    assert_eq!(told.into_inner(), wanted);
 }

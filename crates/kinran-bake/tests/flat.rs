@@ -11,7 +11,7 @@ use kinran_bake::aniso::{
     DirectionMap, Filter, Kernel, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps,
     SurfaceOptions, bake_surface,
 };
-use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, decode};
+use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, decode, untold};
 use kinran_scene::Wrap;
 use proptest::prelude::*;
 
@@ -94,7 +94,7 @@ fn constant_maps_change_from_level_to_level() {
                             packed_with: None,
                         });
                         let options = SurfaceOptions { filter, kernel };
-                        let baked = bake_surface(&maps, options, &requests, &|_| {}).expect("it bakes");
+                        let baked = bake_surface(&maps, options, &requests, &untold).expect("it bakes");
                         for (sheet, texture) in sheets.iter().zip(&baked.textures) {
                             texture.check().expect("a sound texture");
                             let bytes = |level: usize| -> Vec<[u8; 4]> {
@@ -236,7 +236,7 @@ proptest! {
             packed_with: None,
         });
         let options = SurfaceOptions { filter: Filter::Ml, kernel };
-        let baked = bake_surface(&maps, options, &requests, &|_| {}).unwrap();
+        let baked = bake_surface(&maps, options, &requests, &untold).unwrap();
         for level in &baked.levels {
             let numbers = [level.ndf_l2, level.normal_rms_degrees, level.alpha_t_rms, level.alpha_b_rms];
             prop_assert!(numbers.iter().all(|v| v.is_finite()), "{level:?}");
@@ -258,7 +258,7 @@ fn odd_footprints_are_probed_beyond_their_end() {
             encoding: Encoding { format: Format::Rgba8, encoder: Encoder::Portable, preset: Preset::Fast },
             packed_with: None,
         };
-        let baked = bake_surface(&maps, SurfaceOptions::default(), &[request], &|_| {}).expect("it bakes");
+        let baked = bake_surface(&maps, SurfaceOptions::default(), &[request], &untold).expect("it bakes");
         for level in &baked.levels {
             assert!(level.ndf_l2 < 1e-3, "width {width}: {level:?}");
         }

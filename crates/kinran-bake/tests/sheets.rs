@@ -12,7 +12,7 @@ use kinran_bake::aniso::{
     Filter, Kernel, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps, SurfaceOptions,
     bake_surface, decode_aniso, decode_khr, ndf_error,
 };
-use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset};
+use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, untold};
 use kinran_scene::Wrap;
 use kinran_shading::{Sym2, aniso_from_alphas};
 
@@ -134,7 +134,7 @@ fn packed_channels_are_lost() {
             for format in [Format::Rgba8, Format::Rgba16F] {
                 let request =
                     SheetRequest { sheet, encoding: Encoding { format, ..PLAIN }, packed_with: Some(&orm) };
-                let baked = bake_surface(&maps, SurfaceOptions::default(), &[request], &|_| {}).unwrap();
+                let baked = bake_surface(&maps, SurfaceOptions::default(), &[request], &untold).unwrap();
                 let (columns, rows) = (box_weights(width as usize), box_weights(height as usize));
                 for level in 0..baked.textures[0].levels.len() {
                     let texels = baked.textures[0].decode_level(level).unwrap();
@@ -191,7 +191,7 @@ fn reported_errors_are_not_those_made() {
         };
         for filter in [Filter::Ml, Filter::Linear] {
             let options = SurfaceOptions { filter, kernel: Kernel::Box };
-            let baked = bake_surface(&maps, options, &requests, &|_| {}).unwrap();
+            let baked = bake_surface(&maps, options, &requests, &untold).unwrap();
             for (level, filtered) in levels_of(&maps, filter, Kernel::Box).iter().enumerate() {
                 let stored: Vec<_> = baked.textures.iter().map(|t| t.decode_level(level).unwrap()).collect();
                 let (mut angle, mut largest, mut t, mut b) = (0.0, 0.0_f64, 0.0, 0.0);
@@ -235,7 +235,7 @@ fn the_filters_reported_error_is_of_other_footprints() {
     let texels: Vec<Surface> = (0..8 * 8).map(|_| random.texel((0.05, 0.6), 0.2)).collect();
     let maps = maps_of(&texels, 8, Wrap::Repeat);
     let request = SheetRequest { sheet: Sheet::Aniso, encoding: PLAIN, packed_with: None };
-    let baked = bake_surface(&maps, SurfaceOptions::default(), &[request], &|_| {}).unwrap();
+    let baked = bake_surface(&maps, SurfaceOptions::default(), &[request], &untold).unwrap();
     let levels = levels_of(&maps, Filter::Ml, Kernel::Box);
     assert_eq!(baked.levels[0].ndf_l2, 0.0);
     for level in 1..4 {

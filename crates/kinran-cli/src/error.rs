@@ -1,5 +1,7 @@
 use std::path::{Path, PathBuf};
 
+use kinran_image::Cancelled;
+
 use crate::Failure;
 use crate::values::counted;
 
@@ -66,6 +68,9 @@ pub enum Error {
     /// Standard output could not be written.
     #[error("standard output: {0}; send it elsewhere")]
     Stdout(#[from] std::io::Error),
+    /// The work was stopped.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// A defect of the program.
     #[error("{0}; this is a defect of kinran, please report it")]
     Internal(String),
@@ -132,7 +137,7 @@ impl Error {
     /// What kind of error it is, in a word that stays the same: `usage` flags; `input` a file of the wrong kind or in
     /// the wrong place; `io` the system refused; `malformed` a damaged file; `unsupported` a sound one with something
     /// that is not known; `maps` a folder of maps that cannot be understood; `manifest`; `entries` of a manifest failed;
-    /// `render`; `gpu`; `shader`; `internal` a defect of the program.
+    /// `render`; `gpu`; `shader`; `cancelled` work that was stopped; `internal` a defect of the program.
     pub fn code(&self) -> &'static str {
         use kinran_bake::folder::FolderError;
         use kinran_render::Error as RenderError;
@@ -141,6 +146,7 @@ impl Error {
                 kinran_image::Error::Io { .. } => "io",
                 kinran_image::Error::Malformed { .. } => "malformed",
                 kinran_image::Error::Unsupported(_) => "unsupported",
+                kinran_image::Error::Cancelled(_) => "cancelled",
             }
         }
         match self {
@@ -157,6 +163,7 @@ impl Error {
             Error::Scene(kinran_scene::Error::Malformed { .. }) => "malformed",
             Error::Scene(kinran_scene::Error::Unsupported { .. }) => "unsupported",
             Error::Folder(_) => "maps",
+            Error::Cancelled(_) => "cancelled",
             Error::Manifest(_) => "manifest",
             Error::Entries { .. } => "entries",
             Error::Render(RenderError::Gpu(_)) => "gpu",
@@ -179,7 +186,7 @@ impl Error {
                 kinran_image::Error::Io { path, .. } | kinran_image::Error::Malformed { path, .. } => {
                     Some(path)
                 }
-                kinran_image::Error::Unsupported(_) => None,
+                kinran_image::Error::Unsupported(_) | kinran_image::Error::Cancelled(_) => None,
             },
             Error::Scene(
                 kinran_scene::Error::Io { path, .. }
@@ -219,12 +226,13 @@ impl Error {
         }
     }
 
-    /// 2 where the input or the flags are to blame, 1 where the program is.
+    /// 2 where the input or the flags are to blame, 1 where the program is, 130 where the work was stopped, as by Ctrl-C.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::About { error, .. } => error.exit_code(),
             Error::Retold(failure) => failure.exit_code,
             Error::Internal(_) | Error::Render(kinran_render::Error::SizeMismatch { .. }) => 1,
+            _ if self.code() == "cancelled" => 130,
             _ => 2,
         }
     }

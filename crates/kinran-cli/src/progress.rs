@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use kinran_image::Cancelled;
 
 /// A command shorter than this shows nothing.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -162,6 +163,15 @@ impl Stage {
     /// Tells of so many units more that are to be done; from any thread.
     pub fn expect(&self, units: u64) {
         self.work.total.fetch_add(units, Ordering::Relaxed);
+    }
+
+    /// [`Stage::add`] as work that can be stopped calls it.
+    ///
+    /// # Errors
+    /// Never.
+    pub fn tick(&self, units: u64) -> Result<(), Cancelled> {
+        self.add(units);
+        Ok(())
     }
 
     /// Counts `units` more as done; from any thread.

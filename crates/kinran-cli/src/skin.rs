@@ -176,9 +176,9 @@ pub(crate) fn tables(
     let radial = profile.radial().map_err(|e| Error::Usage(format!("material \"{material}\": {e}")))?;
     let table = skin_table;
     let stage = progress.stage("integrating tables of skin", (SIZE.0 * SIZE.1) as u64);
-    let add = |points| stage.add(points);
+    let tick = |points| stage.tick(points);
     Ok(SkinTables {
-        punctual: table(punctual_table(radial, SIZE.0, SIZE.1, f64::from(range), &add)),
+        punctual: table(punctual_table(radial, SIZE.0, SIZE.1, f64::from(range), &tick)?),
         ambient: table(ambient_table(radial, SIZE.0, f64::from(range))),
         penumbra: table(penumbra_table(radial, PENUMBRA_SIZE.0, PENUMBRA_SIZE.1, 1.0)),
         range,

@@ -219,10 +219,10 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let range = f64::from(args.range);
     let points = width * height * (1 + INTERPOLATION_GRID * INTERPOLATION_GRID);
     let stage = console.progress().stage("integrating tables", points as u64);
-    let progress = |points| stage.add(points);
-    let punctual = punctual_table(radial, width, height, range, &progress);
+    let tick = |points| stage.tick(points);
+    let punctual = punctual_table(radial, width, height, range, &tick)?;
     let ambient = ambient_table(radial, width, range);
-    let error = punctual_interpolation_error(radial, &punctual, range, &progress);
+    let error = punctual_interpolation_error(radial, &punctual, range, &tick)?;
 
     let mut report = Report {
         kinran: env!("CARGO_PKG_VERSION"),

@@ -6,8 +6,11 @@ use std::sync::Arc;
 use clap::ValueEnum;
 use glam::{Mat3, Vec2, Vec3, Vec4, vec2, vec3};
 use kinran_bake::aniso::Filter;
-use kinran_bake::curvature::{BLUR, Mesh, Options, bake_curvature, estimated_normals, principal};
+use kinran_bake::curvature::{
+    BLUR, CurvatureError, Mesh, Options, bake_curvature, estimated_normals, principal,
+};
 use kinran_bake::skin_lut::{Profile, Table, punctual_table};
+use kinran_image::untold;
 use kinran_render::reference::{
     PictureCamera, RenderScene, RenderSkin, SkinCurvature, SkinTable, SurfacePoint, TextureFiltering,
 };
@@ -20,7 +23,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::bake::curvature::{
-    Blur, Joined, MethodName, deviations, measured, meshes, pose_scale, shares, triangles_of, unit,
+    Blur, Joined, MethodName, deviations, measured, meshes, pose_scale, triangles_of, unit,
 };
 use crate::model::{model_at, read_scene};
 use crate::picture::{Color, INK, PAPER, Picture, Row, grid};
@@ -335,7 +338,7 @@ fn bake(
         if group.iter().any(|&i| scene.primitives[i].source.lacks_normals) {
             let primitives: Vec<&Primitive> = group.iter().map(|&i| &scene.primitives[i]).collect();
             let surface = Joined::new(&primitives);
-            let normals = estimated_normals(&surface.positions, &surface.triangles);
+            let normals = estimated_normals(&surface.positions, &surface.triangles, &untold)?;
             for (&i, &first) in group.iter().zip(&surface.firsts) {
                 let primitive = &mut scene.primitives[i];
                 if !primitive.source.lacks_normals {
@@ -363,8 +366,11 @@ fn bake(
             tangents: Some(&surface.tangents),
             triangles: &surface.triangles,
         };
-        let baked = bake_curvature(&mesh, &options, &shares(&stage, surface.triangles.len()))
-            .map_err(|e| Error::file_error(&args.file, format!("{name}: {e}")))?;
+        let baked =
+            bake_curvature(&mesh, &options, &|triangles| stage.tick(triangles)).map_err(|e| match e {
+                CurvatureError::Cancelled(stopped) => stopped.into(),
+                e => Error::file_error(&args.file, format!("{name}: {e}")),
+            })?;
         let remarks = baked.report.remarks();
         if !remarks.is_empty() {
             warnings.push(format!("{name}: {remarks}"));
@@ -521,7 +527,7 @@ impl Studio<'_> {
                 let radial = wrong.radial().map_err(|e| Error::Internal(e.to_string()))?;
                 let mut tables = (*skin.tables).clone();
                 let range = f64::from(tables.range);
-                tables.punctual = skin_table(punctual_table(radial, SIZE.0, SIZE.1, range, &|_| {}));
+                tables.punctual = skin_table(punctual_table(radial, SIZE.0, SIZE.1, range, &untold)?);
                 skin.tables = Arc::new(tables);
             }
             wrongs.push(self.draw("radial", &swapped, &light)?);

@@ -188,7 +188,7 @@ fn textures<const N: usize>(
         .sum();
     let stage = progress.stage(format!("{} {name}", filter.name()), texels);
     let options = SurfaceOptions { filter, ..SurfaceOptions::default() };
-    let baked = bake_surface(maps, options, &requests, &|texels| stage.add(texels))?;
+    let baked = bake_surface(maps, options, &requests, &|texels| stage.tick(texels))?;
     let decoded: Vec<_> = baked
         .textures
         .iter()

@@ -225,9 +225,9 @@ fn a_bake_keeps_fuzz_and_leaves_a_sheen_for_others() {
 #[test]
 fn between_the_tilts_of_a_fit_its_error_stays_within_what_is_stated() {
     use glam::DVec3;
+    use kinran_bake::fuzz_fit::{Fibres, Phase};
     use kinran_cli::Progress;
     use kinran_cli::surfaces::fuzz_fits;
-    use kinran_bake::fuzz_fit::{Fibres, Phase};
     use kinran_scene::FuzzPhase;
     use kinran_shading::fuzz::{fuzz_alpha, fuzz_g};
 

@@ -1,6 +1,8 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use crate::Cancelled;
+
 /// Why an image or a texture could not be read, written, encoded or decoded.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -23,6 +25,9 @@ pub enum Error {
     /// The request cannot be served: a format, size or option outside what the function can do.
     #[error("{0}")]
     Unsupported(String),
+    /// A [`Tick`](crate::Tick) stopped the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 impl Error {

@@ -36,6 +36,7 @@ mod size;
 pub mod srgb;
 mod texture;
 mod texture_file;
+mod tick;
 mod unfinished;
 mod write;
 
@@ -49,6 +50,7 @@ pub use read::{IMAGE_EXTENSIONS, decode_image, has_image_extension, read_image, 
 pub use size::{image_size, image_size_of};
 pub use texture::{Level, Texture, full_level_count, level_size};
 pub use texture_file::{decode_texture, read_texture, write_texture};
+pub use tick::{Cancelled, Tick, untold};
 pub use unfinished::{Unfinished, remove_unfinished};
 pub use write::{
     encode_png, is_temporary, write_atomically, write_atomically_in, write_atomically_with, write_exr,

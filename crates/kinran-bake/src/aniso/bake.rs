@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use glam::{Vec2, Vec3, vec2, vec3};
 use kinran_image::{
-    Encoding, Error, Format, Image, Level, Texture, Transfer, decode, encode, encode_half, full_level_count,
-    level_size,
+    Encoding, Error, Format, Image, Level, Texture, Tick, Transfer, decode, encode, encode_half,
+    full_level_count, level_size,
 };
 use kinran_shading::Sym2;
 use rayon::prelude::*;
@@ -74,16 +74,16 @@ pub struct BakedSurface {
 /// level 5 and above, and a quarter of a million texels of level 0.
 const MEASURED_BANDS: u32 = 4;
 
-/// Filters a surface and compresses it to the textures asked for, in parallel; `progress` is told how many
-/// texels were finished since it was last called.
+/// Filters a surface and compresses it to the textures asked for, in parallel; `tick` is told of texels of the mip chain that
+/// are in all of them.
 ///
 /// # Errors
-/// [`Error::Unsupported`] where an encoder refuses.
+/// [`Error::Unsupported`] where an encoder refuses, [`Error::Cancelled`] where `tick` does.
 pub fn bake_surface(
     maps: &SurfaceMaps,
     options: SurfaceOptions,
     requests: &[SheetRequest],
-    progress: &(impl Fn(u64) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<BakedSurface, Error> {
     let size = maps.size();
     let authored = authored_directions(maps);
@@ -91,34 +91,32 @@ pub fn bake_surface(
         .iter()
         .map(|request| {
             let image = match request.sheet {
-                Sheet::KhrAnisotropy => authored.as_ref().map(|authored| authored.image)?,
-                _ => request.packed_with?,
+                Sheet::KhrAnisotropy => authored.as_ref().map(|authored| authored.image),
+                _ => request.packed_with,
             };
-            Some(plain_levels(image, size, Transfer::Linear, options.kernel, maps.wrap))
+            let levels =
+                |image| plain_levels(image, size, Transfer::Linear, options.kernel, maps.wrap, &|_| tick(0));
+            image.map(levels).transpose()
         })
-        .collect();
+        .collect::<Result<_, _>>()?;
     let turn = authored.map_or(Vec2::X, |authored| authored.turn);
 
     // Compress, band by band.
     let bands = filter_levels(maps, options.filter, options.kernel, |band| {
-        let encoded: Result<Vec<Vec<u8>>, Error> = requests
+        let encoded = requests
             .iter()
             .zip(&beside)
             .map(|(request, beside)| {
                 let beside = beside.as_ref().map(|levels| &levels[band.level]);
                 encode_band(request, beside, turn, band)
             })
-            .collect();
-        let errors = encoded.and_then(|encoded| {
-            let bands = level_size(size.1, band.level).div_ceil(BAND_ROWS);
-            let measured = (band.y0 / BAND_ROWS).is_multiple_of(bands.div_ceil(MEASURED_BANDS));
-            let errors =
-                if measured { compression_error(requests, &encoded, band)? } else { Sums::default() };
-            Ok((encoded, errors, probes(band, size)))
-        });
-        progress(u64::from(band.width) * u64::from(band.rows));
-        errors
-    });
+            .collect::<Result<Vec<Vec<u8>>, Error>>()?;
+        let bands = level_size(size.1, band.level).div_ceil(BAND_ROWS);
+        let measured = (band.y0 / BAND_ROWS).is_multiple_of(bands.div_ceil(MEASURED_BANDS));
+        let errors = if measured { compression_error(requests, &encoded, band)? } else { Sums::default() };
+        tick(u64::from(band.width) * u64::from(band.rows))?;
+        Ok::<_, Error>((encoded, errors, probes(band, size)))
+    })?;
 
     // Put the bands together.
     let levels = full_level_count(size.0, size.1);
@@ -139,8 +137,7 @@ pub fn bake_surface(
         let mut data = vec![Vec::new(); requests.len()];
         let mut sums = Sums::default();
         let mut level_probes = Vec::new();
-        for band in bands {
-            let (encoded, band_sums, band_probes) = band?;
+        for (encoded, band_sums, band_probes) in bands {
             for (all, part) in data.iter_mut().zip(encoded) {
                 all.extend(part);
             }

@@ -82,32 +82,39 @@ impl Band {
 /// Filters `maps` to a full mip chain and hands every band of every level to `consume`, in parallel; returns
 /// what it returned, in order, per level. Level 0 is passed as authored. The result does not depend on the
 /// number of threads.
-pub fn filter_levels<T: Send>(
+///
+/// # Errors
+/// The first one that `consume` gives; no band is begun after it.
+pub fn filter_levels<T: Send, E: Send>(
     maps: &SurfaceMaps,
     filter: Filter,
     kernel: Kernel,
-    consume: impl Fn(&Band) -> T + Sync,
-) -> Vec<Vec<T>> {
+    consume: impl Fn(&Band) -> Result<T, E> + Sync,
+) -> Result<Vec<Vec<T>>, E> {
     let size = maps.size();
     let finest = in_bands(size, 0, |band| {
         maps.decode_rows(size, band.y0, band.rows, &mut band.texels);
         debug_assert!(band.is_sound(), "level 0, rows from {}", band.y0);
         consume(band)
-    });
-    std::iter::once(finest).chain(coarser_levels(maps, filter, kernel, &consume)).collect()
+    })?;
+    let coarser = coarser_levels(maps, filter, kernel, &consume)?;
+    Ok(std::iter::once(finest).chain(coarser).collect())
 }
 
 /// [`filter_levels`] without level 0.
-pub fn coarser_levels<T: Send>(
+///
+/// # Errors
+/// As [`filter_levels`].
+pub fn coarser_levels<T: Send, E: Send>(
     maps: &SurfaceMaps,
     filter: Filter,
     kernel: Kernel,
-    consume: impl Fn(&Band) -> T + Sync,
-) -> Vec<Vec<T>> {
+    consume: impl Fn(&Band) -> Result<T, E> + Sync,
+) -> Result<Vec<Vec<T>>, E> {
     match filter {
-        Filter::Linear => moment_levels::<LinearFilter, T>(maps, kernel, &consume),
-        Filter::Lean => moment_levels::<LeanFilter, T>(maps, kernel, &consume),
-        Filter::Naive => moment_levels::<NaiveFilter, T>(maps, kernel, &consume),
+        Filter::Linear => moment_levels::<LinearFilter, T, E>(maps, kernel, &consume),
+        Filter::Lean => moment_levels::<LeanFilter, T, E>(maps, kernel, &consume),
+        Filter::Naive => moment_levels::<NaiveFilter, T, E>(maps, kernel, &consume),
         Filter::Dpd => footprint_levels(maps, kernel, dpd::fit_band, &consume),
         Filter::Ml => footprint_levels(maps, kernel, ml::fit_band, &consume),
         Filter::Param => footprint_levels(maps, kernel, param::fit_band, &consume),
@@ -116,7 +123,11 @@ pub fn coarser_levels<T: Send>(
 
 /// Runs `make` over a level in bands, in parallel; it sets the band's texels. Their memory goes from band to band, since
 /// fresh pages cost more than what is computed into them.
-fn in_bands<T: Send>(size: (u32, u32), level: usize, make: impl Fn(&mut Band) -> T + Sync) -> Vec<T> {
+fn in_bands<T: Send, E: Send>(
+    size: (u32, u32),
+    level: usize,
+    make: impl Fn(&mut Band) -> Result<T, E> + Sync,
+) -> Result<Vec<T>, E> {
     let (width, height) = (level_size(size.0, level), level_size(size.1, level));
     (0..height.div_ceil(BAND_ROWS))
         .into_par_iter()
@@ -168,11 +179,11 @@ impl<F: MomentFilter> PlaneRows for MomentRows<'_, F> {
 }
 
 /// Levels by averages.
-fn moment_levels<F: MomentFilter, T: Send>(
+fn moment_levels<F: MomentFilter, T: Send, E: Send>(
     maps: &SurfaceMaps,
     kernel: Kernel,
-    consume: &(impl Fn(&Band) -> T + Sync),
-) -> Vec<Vec<T>> {
+    consume: &(impl Fn(&Band) -> Result<T, E> + Sync),
+) -> Result<Vec<Vec<T>>, E> {
     let source = MomentRows::<F> { maps, size: maps.size(), filter: PhantomData };
     reduce_levels(&source, source.size, kernel, maps.wrap, |planes, texels: &mut TexelSpan| {
         texels.clear();
@@ -270,12 +281,12 @@ fn moments<F: MomentFilter>([nx, ny, nz, axx, axy, ayy]: &[&[f32]; 6], i: usize)
 }
 
 /// Levels fitted footprint by footprint from level 0.
-fn footprint_levels<T: Send>(
+fn footprint_levels<T: Send, E: Send>(
     maps: &SurfaceMaps,
     kernel: Kernel,
     fit_band: impl Fn(&SurfaceMaps, &[Taps], &[Taps], &mut TexelSpan) + Sync,
-    consume: &(impl Fn(&Band) -> T + Sync),
-) -> Vec<Vec<T>> {
+    consume: &(impl Fn(&Band) -> Result<T, E> + Sync),
+) -> Result<Vec<Vec<T>>, E> {
     let size = maps.size();
     let levels = full_level_count(size.0, size.1);
     let columns = footprints(size.0, levels, kernel, maps.wrap[0]);

@@ -3,7 +3,7 @@
 //! ```
 //! use std::sync::Arc;
 //! use kinran_bake::aniso::*;
-//! use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset};
+//! use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, untold};
 //! use kinran_scene::Wrap;
 //!
 //! // A bump left and right of each texel, on metal of roughness 0.3: from afar it is rough along x alone.
@@ -17,7 +17,7 @@
 //! let encoding = Encoding { format: Format::Rgba8, encoder: Encoder::Portable, preset: Preset::Fast };
 //! let aniso = SheetRequest { sheet: Sheet::Aniso, encoding, packed_with: None };
 //! let options = SurfaceOptions { filter: Filter::Linear, kernel: Kernel::Box };
-//! let baked = bake_surface(&maps, options, &[aniso], &|_| {})?;
+//! let baked = bake_surface(&maps, options, &[aniso], &untold)?;
 //! let [along_x, _, along_y, _] = baked.textures[0].decode_level(1)?[0];
 //! assert!(along_x > 2.0 * along_y);
 //! # Ok::<(), kinran_image::Error>(())

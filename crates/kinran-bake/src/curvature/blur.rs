@@ -16,8 +16,10 @@
 use super::faces::{Corners, frame_tangents, turn};
 use super::surface::{Fans, Welded};
 use crate::aniso::lanes::{F8, LANES, V8};
+use crate::pieces::Pieces;
 use crate::simd::dispatch;
 use glam::{Vec3, Vec4, Vec4Swizzles, vec4};
+use kinran_image::{Cancelled, Tick};
 use kinran_shading::Sym2;
 use rayon::prelude::*;
 
@@ -64,28 +66,31 @@ struct Average {
     rate: f64,
 }
 
-/// Blurs tensors in place by the mean of Gaussians of these deviations, in the mesh's unit. `progress` is told the share that is
-/// done.
+/// Blurs tensors in place by the mean of Gaussians of these deviations, in the mesh's unit. `tick` is told of so many `units`;
+/// where it stops the work, the tensors are what they were.
 pub(crate) fn blur(
     surface: &Welded,
     fans: &Fans,
     normals: &[Vec3],
     tensors: &mut [Sym2],
     deviations: &[f64],
-    progress: &dyn Fn(f32),
-) {
+    units: u64,
+    tick: &Tick<'_>,
+) -> Result<(), Cancelled> {
     // Lengths in the unit in which the model is about one large.
     let scale = surface.unit_scale();
     let deviations: Vec<f64> = deviations.iter().map(|d| d * f64::from(scale)).collect();
     let longest = deviations.iter().copied().fold(0.0, f64::max);
     if longest <= 0.0 {
-        return;
+        return tick(units);
     }
     let average = Average::new(surface, fans, normals, scale, 0.5 * longest * longest);
     if average.rate <= 0.0 {
-        return;
+        return tick(units);
     }
     let series = coefficients(&deviations, average.rate);
+    let pieces = Pieces::new(tick, units, series.len().max(2));
+    pieces.done()?;
 
     // Trace half, and the deviator as a complex number.
     let start: Vec<Vec4> =
@@ -94,15 +99,17 @@ pub(crate) fn blur(
     let mut before = start;
     let mut now = vec![Vec4::ZERO; before.len()];
     average.step(&before, &mut now, &mut sum, series.get(1).copied().unwrap_or(0.0));
-    for (k, &coefficient) in series.iter().enumerate().skip(2) {
+    pieces.done()?;
+    for &coefficient in series.iter().skip(2) {
         // T(k+1) = 2 Y T(k) - T(k-1), written over T(k-1).
         average.step_over(&now, &mut before, &mut sum, coefficient);
         std::mem::swap(&mut before, &mut now);
-        progress((k + 1) as f32 / series.len() as f32);
+        pieces.done()?;
     }
     for (tensor, sum) in tensors.iter_mut().zip(sum) {
         *tensor = Sym2 { xx: sum.x + sum.y, xy: sum.z, yy: sum.x - sum.y };
     }
+    Ok(())
 }
 
 impl Average {

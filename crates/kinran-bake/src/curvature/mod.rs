@@ -22,7 +22,7 @@
 //! let triangles: Vec<[u32; 3]> = (0..sides * (rings - 1)).flat_map(quad).collect();
 //! let mesh = Mesh { positions: &positions, normals: Some(&normals), tangents: None, triangles: &triangles };
 //! let options = Options { method: Method::Normals, millimetres: 1.0, blur: vec![], clamp: true };
-//! let baked = bake_curvature(&mesh, &options, &|_| {})?;
+//! let baked = bake_curvature(&mesh, &options, &kinran_image::untold)?;
 //! let (across, along, _) = principal(baked.tensors[sides * rings / 2]);
 //! assert!((across - 0.5).abs() < 0.01 && along.abs() < 0.01, "{across} {along}");
 //! # Ok::<(), kinran_bake::curvature::CurvatureError>(())
@@ -37,6 +37,7 @@ mod surface;
 use std::fmt::Write;
 
 use glam::{DVec3, Vec3, Vec4};
+use kinran_image::{Cancelled, Tick};
 use kinran_shading::Sym2;
 use kinran_shading::skin::curvature::{curvature_decode, curvature_encode};
 
@@ -133,6 +134,9 @@ pub enum CurvatureError {
         /// What was given.
         value: f64,
     },
+    /// A [`Tick`] stopped the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// What was found in a mesh, and left out.
@@ -190,25 +194,36 @@ pub struct Curvature {
     pub report: Report,
 }
 
-/// What share of the time the steps before the blur take, and the fit alone; chosen by eye, for bars.
-const BEFORE_BLUR: f32 = 0.3;
-const FIT: f32 = 0.4;
+/// Tenths of the units that are told after the joining of vertices, the normals, the tensors of triangles, and the fit,
+/// where there is one; the blur has the rest. Chosen by eye, for bars.
+const JOINING: u64 = 1;
+const NORMALS: u64 = 1;
+const FACES: u64 = 1;
+const FIT: u64 = 4;
 
-/// Curvature of a mesh. `progress` is told, from any thread, which share of the work is done, 0 to 1.
+/// Curvature of a mesh. `tick` is told of as many units as the mesh has triangles: of each triangle once, spread over all that
+/// is done with them.
 ///
 /// # Errors
-/// [`CurvatureError`] where the mesh or a setting is none.
+/// [`CurvatureError`] where the mesh or a setting is none, or `tick` stops the work.
 pub fn bake_curvature(
     mesh: &Mesh<'_>,
     options: &Options,
-    progress: &(dyn Fn(f32) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<Curvature, CurvatureError> {
     check(mesh, options)?;
+    let all = mesh.triangles.len() as u64;
+    let units = |tenths| all * tenths / 10;
     let surface = weld(mesh.positions, mesh.normals, mesh.triangles);
     let fans = Fans::new(surface.positions.len(), &surface.triangles);
+    tick(units(JOINING))?;
     let (normals, hard_points) = match mesh.normals {
-        Some(authored) => normals::authored_normals(&surface, authored),
-        None => (normals::estimated_normals(&surface, &fans), 0),
+        Some(authored) => {
+            let normals = normals::authored_normals(&surface, authored);
+            tick(units(NORMALS))?;
+            normals
+        }
+        None => (normals::estimated_normals(&surface, &fans, units(NORMALS), tick)?, 0),
     };
     let from_faces = faces::face_tensors(&surface, &normals);
     let mut tensors = from_faces.tensors;
@@ -221,24 +236,18 @@ pub fn bake_curvature(
         ..Report::default()
     };
     (report.border_edges, report.non_manifold_edges) = edges(&surface, &fans);
-    let mut done = if options.blur.is_empty() { 1.0 - FIT } else { BEFORE_BLUR };
-    progress(done);
-    if options.method == Method::Fit || !options.blur.is_empty() {
-        if options.method == Method::Fit {
-            let of_fit = |share: f32| progress(done + FIT * share);
-            report.unfitted_points =
-                quadric::quadric_tensors(&surface, &fans, &normals, &mut tensors, &of_fit);
-            done += FIT;
-        }
-        if options.clamp {
-            tensors.iter_mut().for_each(|t| *t = clamp_concave(*t));
-        }
-        let deviations: Vec<f64> = options.blur.iter().map(|mm| mm / options.millimetres).collect();
-        let of_blur = |share: f32| progress(done + (1.0 - done) * share);
-        blur::blur(&surface, &fans, &normals, &mut tensors, &deviations, &of_blur);
-    } else if options.clamp {
+    tick(units(FACES))?;
+    let mut rest = all - units(JOINING) - units(NORMALS) - units(FACES);
+    if options.method == Method::Fit {
+        report.unfitted_points =
+            quadric::quadric_tensors(&surface, &fans, &normals, &mut tensors, units(FIT), tick)?;
+        rest -= units(FIT);
+    }
+    if options.clamp {
         tensors.iter_mut().for_each(|t| *t = clamp_concave(*t));
     }
+    let deviations: Vec<f64> = options.blur.iter().map(|mm| mm / options.millimetres).collect();
+    blur::blur(&surface, &fans, &normals, &mut tensors, &deviations, rest, tick)?;
 
     let mut referenced = vec![false; mesh.positions.len()];
     for &vertex in mesh.triangles.as_flattened() {
@@ -247,7 +256,6 @@ pub fn bake_curvature(
     report.unreferenced_vertices = referenced.iter().filter(|&&r| !r).count();
     let scale = (1.0 / options.millimetres) as f32;
     let (tensors, tangents) = at_vertices(mesh, &surface, &normals, &tensors, scale);
-    progress(1.0);
     Ok(Curvature { tensors, tangents, report })
 }
 
@@ -441,12 +449,20 @@ pub fn principal(tensor: Sym2) -> (f32, f32, [f32; 2]) {
 
 /// Unit normals of a mesh that has none, as [`bake_curvature`] takes them: of the surfaces fitted to the points around each
 /// point, over normals from triangles (Max 1999), which creases keep. On a smooth surface the error falls with the square
-/// of the distance between points or faster. Zero at vertices of no triangle.
-pub fn estimated_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+/// of the distance between points or faster. Zero at vertices of no triangle. `tick` is told of as many units as there are
+/// triangles.
+///
+/// # Errors
+/// Where `tick` stops the work.
+pub fn estimated_normals(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    tick: &Tick<'_>,
+) -> Result<Vec<Vec3>, Cancelled> {
     let surface = weld(positions, None, triangles);
     let fans = Fans::new(surface.positions.len(), &surface.triangles);
-    let normals = normals::estimated_normals(&surface, &fans);
-    surface.point_of.iter().map(|&point| normals[point as usize]).collect()
+    let normals = normals::estimated_normals(&surface, &fans, triangles.len() as u64, tick)?;
+    Ok(surface.point_of.iter().map(|&point| normals[point as usize]).collect())
 }
 
 /// The scale of an affine map: the cube root of its determinant, and whether it is the same in all directions to 1 %.

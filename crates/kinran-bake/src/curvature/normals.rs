@@ -3,11 +3,17 @@
 use super::quadric::quadric_normals;
 use super::surface::{Fans, Welded};
 use glam::Vec3;
+use kinran_image::{Cancelled, Tick};
 
 /// Normals of a mesh that has none: of the surfaces that [`quadric_normals`] fits over [`max_normals`]. Zero where no
-/// triangle says anything.
-pub(crate) fn estimated_normals(surface: &Welded, fans: &Fans) -> Vec<Vec3> {
-    quadric_normals(surface, fans, &max_normals(surface))
+/// triangle says anything. `tick` is told of so many `units`.
+pub(crate) fn estimated_normals(
+    surface: &Welded,
+    fans: &Fans,
+    units: u64,
+    tick: &Tick<'_>,
+) -> Result<Vec<Vec3>, Cancelled> {
+    quadric_normals(surface, fans, &max_normals(surface), units, tick)
 }
 
 /// Normals from the triangles around each point (Max. Weights for Computing Vertex Normals from Facet Normals. Journal of

@@ -18,12 +18,12 @@
 //! half as uncertain over three rings, shape that the fit does not follow makes them more so. Where it is noise, the point
 //! is fitted over three rings with a height of its own and all neighbours alike, unless that contradicts the nearer fit.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use super::faces::frame;
 use super::surface::{Fans, Welded, others};
+use crate::pieces::Pieces;
 use crate::simd::dispatch;
 use glam::{DVec3, Vec3};
+use kinran_image::{Cancelled, Tick};
 use kinran_shading::Sym2;
 use rayon::prelude::*;
 
@@ -70,27 +70,36 @@ const LANES: usize = 8;
 type Lanes = [f64; LANES];
 
 /// Tensors of points as [`face_tensors`](super::faces::face_tensors) gives them, and how many points could not be fitted and
-/// keep the given ones. `progress` is told the share that is done.
+/// keep the given ones. `tick` is told of so many `units`.
 pub(crate) fn quadric_tensors(
     surface: &Welded,
     fans: &Fans,
     normals: &[Vec3],
     tensors: &mut [Sym2],
-    progress: &(dyn Fn(f32) + Sync),
-) -> usize {
-    fit(surface, fans, normals, tensors, |graph, _| graph.shape_operator(), progress)
+    units: u64,
+    tick: &Tick<'_>,
+) -> Result<usize, Cancelled> {
+    let pieces = Pieces::new(tick, units, tensors.len().div_ceil(BAND));
+    fit(surface, fans, normals, tensors, |graph, _| graph.shape_operator(), &pieces)
 }
 
 /// Normals of the fitted surfaces, whose error falls with the square of the distance between points or faster. Points that
-/// cannot be fitted, and those on creases, keep the given ones.
-pub(crate) fn quadric_normals(surface: &Welded, fans: &Fans, given: &[Vec3]) -> Vec<Vec3> {
+/// cannot be fitted, and those on creases, keep the given ones. `tick` is told of so many `units`.
+pub(crate) fn quadric_normals(
+    surface: &Welded,
+    fans: &Fans,
+    given: &[Vec3],
+    units: u64,
+    tick: &Tick<'_>,
+) -> Result<Vec<Vec3>, Cancelled> {
     let mut normals = given.to_vec();
     let of = |graph: Graph, point: usize| {
         let normal = graph.normal(given[point]);
         if normal.dot(given[point]) > SAME_NORMAL { normal } else { given[point] }
     };
-    fit(surface, fans, given, &mut normals, of, &|_| {});
-    normals
+    let pieces = Pieces::new(tick, units, normals.len().div_ceil(BAND));
+    fit(surface, fans, given, &mut normals, of, &pieces)?;
+    Ok(normals)
 }
 
 /// Puts what `of` makes of the surface fitted at each point into `results`, and leaves them as they are where there is
@@ -101,19 +110,18 @@ fn fit<T: Send>(
     normals: &[Vec3],
     results: &mut [T],
     of: impl Fn(Graph, usize) -> T + Sync,
-    progress: &(dyn Fn(f32) + Sync),
-) -> usize {
+    pieces: &Pieces<'_>,
+) -> Result<usize, Cancelled> {
     let points = surface.positions.len();
     let rings = || Rings { seen: vec![u32::MAX; points], points: Vec::with_capacity(NEIGHBOURS_MAX) };
-    let (count, done) = (results.len().div_ceil(BAND), AtomicUsize::new(0));
     let bands = results.par_chunks_mut(BAND).enumerate();
     let unfitted = bands.map_init(rings, |rings, (band, results)| {
         let first = band * BAND;
         let unfitted = dispatch(FitBand { surface, fans, normals, rings, first, results, of: &of });
-        progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f32 / count as f32);
-        unfitted
+        pieces.done()?;
+        Ok(unfitted)
     });
-    unfitted.sum()
+    unfitted.try_reduce(|| 0, |a, b| Ok(a + b))
 }
 
 struct FitBand<'a, T, F> {

@@ -1,5 +1,7 @@
 //! Maps as planes of the numbers a sampler filters, level by level.
 
+use std::convert::Infallible;
+
 use kinran_image::srgb::{byte_from_linear, linear_from_byte, linear_from_srgb, linear_of_codes};
 use kinran_image::{
     Channels, Encoding, Error, Format, Image, Level, Pixels, Texture, Transfer, encode, level_size,
@@ -153,8 +155,8 @@ impl PlaneRows for Planes {
 /// length again.
 pub(crate) fn mip_chain(finest: Planes, kind: MapKind) -> Vec<Planes> {
     let size = (finest.width, finest.height);
-    let coarser = reduce_levels(&finest, size, Kernel::Box, [Wrap::Repeat; 2], |band, (): &mut ()| {
-        (band.y0, band.samples.to_vec())
+    let Ok(coarser) = reduce_levels(&finest, size, Kernel::Box, [Wrap::Repeat; 2], |band, (): &mut ()| {
+        Ok::<_, Infallible>((band.y0, band.samples.to_vec()))
     });
     let coarser: Vec<Planes> = coarser
         .into_iter()

@@ -3,6 +3,7 @@
 
 pub mod exact;
 
+use std::convert::Infallible;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -68,8 +69,8 @@ pub fn maps_of(texels: &[Surface], width: u32, wrap: Wrap) -> SurfaceMaps {
 
 /// All texels of all levels.
 pub fn levels_of(maps: &SurfaceMaps, filter: Filter, kernel: Kernel) -> Vec<Vec<Surface>> {
-    let bands = filter_levels(maps, filter, kernel, |band| {
-        (0..band.texels.len()).map(|i| band.texels.texel(i)).collect::<Vec<_>>()
+    let Ok(bands) = filter_levels(maps, filter, kernel, |band| {
+        Ok::<Vec<_>, Infallible>((0..band.texels.len()).map(|i| band.texels.texel(i)).collect())
     });
     bands.into_iter().map(|bands| bands.concat()).collect()
 }

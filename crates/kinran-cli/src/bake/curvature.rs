@@ -1,14 +1,12 @@
 //! Curvature of a glTF file's meshes, as a vertex attribute.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use clap::ValueEnum;
 use glam::{Mat3, Vec3, Vec4};
 use kinran_bake::curvature::{
-    BLUR, Curvature, Mesh, Method, Options, Packed, bake_curvature, estimated_normals, principal,
-    uniform_scale,
+    BLUR, Curvature, CurvatureError, Mesh, Method, Options, Packed, bake_curvature, estimated_normals,
+    principal, uniform_scale,
 };
-use kinran_image::{write_atomically, write_exr_planes};
+use kinran_image::{untold, write_atomically, write_exr_planes};
 use kinran_scene::{Attribute, Document, Instance, Maps, Needs, Pose, Primitive, Scene, Skin};
 use kinran_shading::Sym2;
 use schemars::JsonSchema;
@@ -17,7 +15,7 @@ use serde_json::{Value, json};
 
 use super::file_stem;
 use crate::values::number;
-use crate::{Console, Error, Stage};
+use crate::{Console, Error};
 
 /// The extension that makes a material skin.
 const SKIN: &str = "KINRAN_materials_skin";
@@ -198,7 +196,7 @@ pub(super) fn with_normals(args: &super::Args) -> Result<Option<tempfile::TempDi
     for mesh in meshes(&scene) {
         let group: Vec<&Primitive> = mesh.iter().map(|&i| &scene.primitives[i]).collect();
         let surface = Joined::new(&group);
-        let normals = estimated_normals(&surface.positions, &surface.triangles);
+        let normals = estimated_normals(&surface.positions, &surface.triangles, &untold)?;
         for (primitive, &first) in group.iter().zip(&surface.firsts) {
             if !primitive.source.lacks_normals {
                 continue;
@@ -323,9 +321,12 @@ pub(super) fn bake(
                 triangles: &surface.triangles,
             },
             &options,
-            &shares(&stage, surface.triangles.len()),
+            &|triangles| stage.tick(triangles),
         )
-        .map_err(|e| at_fault(e.to_string()))?;
+        .map_err(|e| match e {
+            CurvatureError::Cancelled(stopped) => stopped.into(),
+            e => at_fault(e.to_string()),
+        })?;
         let packed = baked.pack(flags.curvature_range.unwrap_or_else(|| baked.fitting_range()));
         for (primitive, &first) in group.iter().zip(&surface.firsts) {
             if wanted(primitive) {
@@ -445,15 +446,6 @@ pub(crate) fn stretch(scene: &Scene, mesh: &[usize]) -> Stretch {
 /// Triangles of primitives.
 pub(crate) fn triangles_of<'a>(scene: &Scene, primitives: impl Iterator<Item = &'a usize>) -> u64 {
     primitives.map(|&i| scene.primitives[i].triangles.len() as u64).sum()
-}
-
-/// Tells a stage, whose units are triangles, what share of a mesh of so many is done.
-pub(crate) fn shares(stage: &Stage, triangles: usize) -> impl Fn(f32) + Sync {
-    let told = AtomicU64::new(0);
-    move |share| {
-        let done = (f64::from(share) * triangles as f64) as u64;
-        stage.add(done.saturating_sub(told.fetch_max(done, Ordering::Relaxed)));
-    }
 }
 
 /// Primitives as one surface.

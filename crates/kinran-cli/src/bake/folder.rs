@@ -247,7 +247,7 @@ fn bake_material(args: &Args, console: &Console, material: &LoadedMaterial) -> R
             .collect();
 
         let stage = console.progress().stage(format!("{} {name}", args.filter.name()), mip_texels(size));
-        let baked = bake_surface(maps, args.options(), &requests, &|texels| stage.add(texels))?;
+        let baked = bake_surface(maps, args.options(), &requests, &|texels| stage.tick(texels))?;
         drop(stage);
         let writing = console.progress().stage(format!("writing {name}"), sheets.len() as u64);
         report.levels = baked.levels;
@@ -289,7 +289,7 @@ fn plain(
 ) -> Result<Texture, Error> {
     let stage = console.progress().stage(what, mip_texels((image.width, image.height)));
     let kernel = args.options().kernel;
-    Ok(bake_plain(image, transfer, encoding, kernel, args.wrap(), &|texels| stage.add(texels))?)
+    Ok(bake_plain(image, transfer, encoding, kernel, args.wrap(), &|texels| stage.tick(texels))?)
 }
 
 /// Occlusion, roughness, metalness and alpha of a packed map where there is no map of them: open, as the flag says or is

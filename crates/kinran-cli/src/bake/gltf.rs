@@ -610,7 +610,7 @@ impl SurfaceBaker<'_> {
 
         let texels = mip_texels(size);
         let stage = self.console.progress().stage(format!("{} {}", args.filter.name(), m.name), texels);
-        let baked = bake_surface(maps, args.options(), &requests, &|texels| stage.add(texels))?;
+        let baked = bake_surface(maps, args.options(), &requests, &|texels| stage.tick(texels))?;
         drop(stage);
         let writing =
             self.console.progress().stage(format!("writing {}", m.name), baked.textures.len() as u64);
@@ -817,7 +817,7 @@ fn bake_colors(
         let kernel = args.options().kernel;
         let texture =
             bake_plain(image, color.transfer, color.encoding(args), kernel, place.wrap, &|texels| {
-                stage.add(texels)
+                stage.tick(texels)
             })?;
         let outputs = write_texture(args, &color.name, content, texture)?;
         let (material, slot) = color.slots[0];

@@ -14,7 +14,9 @@ use kinran_bake::detail::{
     Tile, TileOptions, bearable_opacity, compare, level_pictures,
 };
 use kinran_bake::folder::{Green, Role, named_maps};
-use kinran_image::{Channels, Encoding, Image, Level, Pixels, encode_png, read_layer, write_atomically};
+use kinran_image::{
+    Channels, Encoding, Image, Level, Pixels, encode_png, read_layer, untold, write_atomically,
+};
 use kinran_scene::Wrap;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -517,7 +519,7 @@ fn aniso_map(maps: &[MapFile]) -> Result<Option<MapFile>, Error> {
     let request =
         SheetRequest { sheet: Sheet::Aniso, encoding: BlockFormat::Rgba8.encoding(), packed_with: None };
     let options = SurfaceOptions { filter: Filter::Linear, ..SurfaceOptions::default() };
-    let baked = bake_surface(&surface, options, &[request], &|_| {})?;
+    let baked = bake_surface(&surface, options, &[request], &untold)?;
     let Some(Level { width, height, data }) = baked.textures[0].levels.get(1) else { return Ok(None) };
     let image = Image::new(*width, *height, Channels::Rgba, Pixels::U8(data.clone()))?;
     Ok(Some(MapFile { role: Role::Aniso, kind: MapKind::Aniso, y_down: false, image }))

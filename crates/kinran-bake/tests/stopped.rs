@@ -1,0 +1,127 @@
+//! Work that is stopped ends soon, with an error, and gives nothing half-done.
+
+mod common;
+mod shapes;
+#[path = "../../stopping.rs"]
+mod stopping;
+
+use std::sync::Arc;
+
+use common::Random;
+use kinran_bake::aniso::{
+    Filter, Kernel, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps, SurfaceOptions,
+    bake_surface,
+};
+use kinran_bake::curvature::{CurvatureError, Mesh, Method, Options, bake_curvature, estimated_normals};
+use kinran_bake::skin_lut::{INTERPOLATION_GRID, Profile, punctual_interpolation_error, punctual_table};
+use kinran_bake::{bake_plain, plain_levels};
+use kinran_image::{
+    Cancelled, Channels, Encoder, Encoding, Error, Format, Image, Pixels, Preset, Transfer, full_level_count,
+    level_size,
+};
+use kinran_scene::Wrap;
+use stopping::assert_stops;
+
+/// Higher than three levels of bands, for averages make three levels at a time.
+const SIZE: (u32, u32) = (40, 400);
+
+const RGBA8: Encoding = Encoding { format: Format::Rgba8, encoder: Encoder::Portable, preset: Preset::Fast };
+
+fn noise(seed: u64) -> Arc<Image> {
+    let mut random = Random::new(seed);
+    let samples = (0..SIZE.0 * SIZE.1 * 3).map(|_| random.uniform(64.0, 192.0) as u8).collect();
+    Arc::new(Image::new(SIZE.0, SIZE.1, Channels::Rgb, Pixels::U8(samples)).unwrap())
+}
+
+/// Texels of a mip chain.
+fn texels(size: (u32, u32)) -> u64 {
+    (0..full_level_count(size.0, size.1))
+        .map(|level| u64::from(level_size(size.0, level)) * u64::from(level_size(size.1, level)))
+        .sum()
+}
+
+fn of_image(error: &Error) -> bool {
+    matches!(error, Error::Cancelled(_))
+}
+
+#[test]
+fn a_stopped_surface_is_baked_on() {
+    let maps = SurfaceMaps {
+        normal: NormalMap::new(noise(1), false),
+        roughness: RoughnessMaps::Isotropic(ScalarMap::channel(noise(2), 0)),
+        wrap: [Wrap::Repeat; 2],
+    };
+    let packed = noise(3);
+    let request = |sheet, packed_with| SheetRequest { sheet, encoding: RGBA8, packed_with };
+    let requests = [request(Sheet::Normal, None), request(Sheet::Roughness, Some(&*packed))];
+    // By averages, and footprint by footprint.
+    for filter in [Filter::Linear, Filter::Dpd] {
+        let options = SurfaceOptions { filter, kernel: Kernel::Box };
+        assert_stops(filter.name(), texels(SIZE), of_image, |tick| {
+            bake_surface(&maps, options, &requests, tick)
+        });
+    }
+}
+
+#[test]
+fn a_stopped_colour_is_baked_on() {
+    let image = noise(4);
+    let wrap = [Wrap::Repeat; 2];
+    assert_stops(
+        "levels",
+        texels(SIZE),
+        |_: &Cancelled| true,
+        |tick| plain_levels(&image, SIZE, Transfer::Srgb, Kernel::Tent, wrap, tick),
+    );
+    assert_stops("texture", texels(SIZE), of_image, |tick| {
+        bake_plain(&image, Transfer::Srgb, RGBA8, Kernel::Box, wrap, tick)
+    });
+}
+
+#[test]
+fn a_stopped_table_of_skin_is_integrated_on() {
+    let (width, height, range) = (16, 24, 0.5);
+    for (name, profile) in [("Gaussians", Profile::default()), ("Burley", Profile::Burley([1.2, 0.5, 0.3]))] {
+        let radial = profile.radial().unwrap();
+        let points = (width * height) as u64;
+        assert_stops(
+            name,
+            points,
+            |_: &Cancelled| true,
+            |tick| punctual_table(radial, width, height, range, tick),
+        );
+        let table = punctual_table(radial, width, height, range, &kinran_image::untold).unwrap();
+        let grid = points * (INTERPOLATION_GRID * INTERPOLATION_GRID) as u64;
+        assert_stops(
+            &format!("the error of {name}"),
+            grid,
+            |_: &Cancelled| true,
+            |tick| punctual_interpolation_error(radial, &table, range, tick),
+        );
+    }
+}
+
+#[test]
+fn a_stopped_curvature_is_baked_on() {
+    // More points than two of the pieces that are fitted at a time.
+    let torus = shapes::torus((100, 100), 1.0, 0.4, 0.2);
+    let triangles = torus.triangles.len() as u64;
+    for method in [Method::Normals, Method::Fit] {
+        for normals in [Some(&*torus.normals), None] {
+            for blur in [vec![], vec![30.0, 10.0]] {
+                let name = format!("{method:?}, normals {}, blur {blur:?}", normals.is_some());
+                let options = Options { method, millimetres: 100.0, blur, clamp: true };
+                let (positions, triangles_of) = (&*torus.positions, &*torus.triangles);
+                let mesh = Mesh { positions, normals, tangents: None, triangles: triangles_of };
+                let is_cancelled = |e: &CurvatureError| *e == CurvatureError::Cancelled(Cancelled);
+                assert_stops(&name, triangles, is_cancelled, |tick| bake_curvature(&mesh, &options, tick));
+            }
+        }
+    }
+    assert_stops(
+        "estimated normals",
+        triangles,
+        |_: &Cancelled| true,
+        |tick| estimated_normals(&torus.positions, &torus.triangles, tick),
+    );
+}
