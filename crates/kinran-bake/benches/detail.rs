@@ -9,7 +9,7 @@ use glam::Vec2;
 use kinran_bake::detail::{
     DetailOptions, Layer, LayerTransform, MapKind, Target, Tile, TileOptions, solve, synthesize,
 };
-use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, encode};
+use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, encode, untold};
 
 /// Texels along a side of the target.
 const SIDE: u32 = 2048;
@@ -79,7 +79,7 @@ fn whole_solution(bencher: Bencher, choose: bool) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     bencher
         .counter(ItemsCount::new(WHOLE * WHOLE))
-        .bench_local(|| pool.install(|| solve(&target, &[repeated(&tile)], &options, &|_| {}).unwrap()));
+        .bench_local(|| pool.install(|| solve(&target, &[repeated(&tile)], &options, &untold).unwrap()));
 }
 
 /// The encoder on the same texels and their mips.

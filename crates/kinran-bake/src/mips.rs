@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use kinran_image::srgb::{linear_from_srgb, srgb_from_linear};
 use kinran_image::{
-    Cancelled, Channels, Encoding, Error, Image, Level, Pixels, Texture, Tick, Transfer, encode_parallel,
+    Cancelled, Channels, Encoding, Error, Image, Level, Pixels, Texture, Tick, Transfer, encode,
     full_level_count, level_size,
 };
 use kinran_scene::Wrap;
@@ -409,9 +409,6 @@ pub fn pack_channels(
     Image::new(size.0, size.1, Channels::Rgba, Pixels::U8(bytes))
 }
 
-/// Rows that are compressed at a time.
-const STRIP_ROWS: usize = 256;
-
 /// The mip chain of an image that needs no filter of its own, compressed. `transfer` as for [`plain_levels`]; `tick` is
 /// told of texels of all levels that are compressed.
 ///
@@ -428,13 +425,13 @@ pub fn bake_plain(
     let levels = plain_levels(image, (image.width, image.height), transfer, kernel, wrap, &|_| tick(0))?
         .into_iter()
         .map(|level| {
-            let mut data = Vec::with_capacity(encoding.format.level_bytes(level.width, level.height));
             let row = 4 * level.width as usize;
-            for strip in level.rgba8.chunks(STRIP_ROWS * row) {
-                let rows = (strip.len() / row) as u32;
-                data.extend(encode_parallel(encoding, strip, level.width, rows)?);
-                tick(u64::from(level.width) * u64::from(rows))?;
-            }
+            let bands = level.rgba8.par_chunks(BAND_ROWS as usize * row).map(|band| {
+                let blocks = encode(encoding, band, level.width, (band.len() / row) as u32)?;
+                tick(band.len() as u64 / 4)?;
+                Ok(blocks)
+            });
+            let data = bands.collect::<Result<Vec<_>, Error>>()?.concat();
             Ok(Level { width: level.width, height: level.height, data })
         })
         .collect::<Result<_, Error>>()?;

@@ -158,7 +158,7 @@ mod tests {
             let target = Target::new(&noise(12), kind, false).unwrap();
             for blend in [Blend::Smooth, Blend::Plain] {
                 let options = DetailOptions { blend, ..DetailOptions::new(encoding(format)) };
-                let solved = solve(&target, &[layer], &options, &|_| {}).unwrap();
+                let solved = solve(&target, &[layer], &options, &untold).unwrap();
                 let bytes = solved.texture.levels.iter().flat_map(|level| &level.data).copied().collect();
                 results.push((format!("detail, {kind:?}, {format:?}, {blend:?}"), bytes));
                 results.push((format!("errors of {kind:?}"), format!("{:?}", solved.levels).into()));
@@ -172,7 +172,7 @@ mod tests {
         let tile = Tile::new(&grey(13), TileOptions::new(MapKind::Data, encoding(Format::Bc4))).unwrap();
         let target = Target::new(&grey(14), MapKind::Data, false).unwrap();
         let options = DetailOptions::new(encoding(Format::Bc4));
-        let solved = solve(&target, &[Layer::new(&tile)], &options, &|_| {}).unwrap();
+        let solved = solve(&target, &[Layer::new(&tile)], &options, &untold).unwrap();
         results.push(("detail, Bc4".into(), solved.texture.levels[0].data.clone()));
 
         // A bumpy sphere.

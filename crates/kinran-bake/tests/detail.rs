@@ -2,10 +2,10 @@
 
 use glam::{Vec2, vec2, vec3};
 use kinran_bake::detail::{
-    Blend, DetailOptions, FADE_TRIALS, Layer, LayerTransform, MapKind, Mask, Target, Tile, TileOptions,
-    bearable_opacity, compare, solve, synthesize,
+    Blend, DetailOptions, Layer, LayerTransform, MapKind, Mask, Target, Tile, TileOptions, compare, solve,
+    synthesize,
 };
-use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset};
+use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, untold};
 
 const RGBA8: Encoding = Encoding { format: Format::Rgba8, encoder: Encoder::Portable, preset: Preset::Fast };
 const BC1: Encoding = Encoding { format: Format::Bc1, encoder: Encoder::Portable, preset: Preset::Normal };
@@ -82,7 +82,7 @@ fn a_target_equal_to_its_tile_asks_for_nothing() {
             let options = DetailOptions { blend, ..options(RGBA8) };
             // Against the tile as authored every level is the target's own.
             let uncompensated = DetailOptions { compensate: false, ..options };
-            let solved = solve(&target, &[Layer::new(&tile)], &uncompensated, &|_| {}).unwrap();
+            let solved = solve(&target, &[Layer::new(&tile)], &uncompensated, &untold).unwrap();
             for (level, data) in solved.texture.levels.iter().enumerate() {
                 for texel in data.data.chunks_exact(4) {
                     let wanted = if kind == MapKind::Normal { [128, 128] } else { [128; 2] };
@@ -101,7 +101,7 @@ fn black_and_white_tiles_round_trip() {
         for grey in [0, 255] {
             let tile = tile(&image(16, 16, |_, _| [grey; 3]), kind, RGBA8);
             let solved =
-                solve(&target(&wanted, kind), &[Layer::new(&tile)], &options(RGBA8), &|_| {}).unwrap();
+                solve(&target(&wanted, kind), &[Layer::new(&tile)], &options(RGBA8), &untold).unwrap();
             // Over black the smooth overlay has up to 2.4 steps of error, see kinran-shading; over sRGB's dark end more.
             assert!(solved.levels[0].error < 1.6, "{kind:?} over {grey}: {:?}", solved.levels[0]);
         }
@@ -125,7 +125,7 @@ fn every_kind_is_reached_under_every_transform() {
         for transform in transforms {
             let layer = Layer { transform, ..Layer::new(&tile) };
             let options = DetailOptions { aniso_alpha: 0.3, ..options(RGBA8) };
-            let solved = solve(&target(&picture, kind), &[layer], &options, &|_| {}).unwrap();
+            let solved = solve(&target(&picture, kind), &[layer], &options, &untold).unwrap();
             assert_eq!(solved.texture.levels.len(), 7);
             for level in &solved.levels[1..] {
                 let limit = if kind == MapKind::Normal { 0.5 } else { 1.3 };
@@ -151,7 +151,7 @@ fn three_layers_with_masks_and_shifts_are_one_detail() {
         ..Layer::new(&tiles[i])
     };
     let layers = [layer(0), layer(1), layer(2)];
-    let solved = solve(&target(&scan(64, 64, 4), kind), &layers, &options(RGBA8), &|_| {}).unwrap();
+    let solved = solve(&target(&scan(64, 64, 4), kind), &layers, &options(RGBA8), &untold).unwrap();
     assert!(solved.levels[1].error < 1.0, "{:?}", solved.levels[1]);
     // The order counts.
     let other = [
@@ -159,7 +159,7 @@ fn three_layers_with_masks_and_shifts_are_one_detail() {
         Layer { mask: layers[1].mask, ..layers[1] },
         Layer { mask: layers[2].mask, ..layers[0] },
     ];
-    let swapped = solve(&target(&scan(64, 64, 4), kind), &other, &options(RGBA8), &|_| {}).unwrap();
+    let swapped = solve(&target(&scan(64, 64, 4), kind), &other, &options(RGBA8), &untold).unwrap();
     assert_ne!(solved.texture.levels[0].data, swapped.texture.levels[0].data);
 }
 
@@ -171,7 +171,7 @@ fn sixteen_bits_say_what_eight_say() {
     let sixteen = Image::new(40, 40, Channels::Rgb, Pixels::U16(wide)).unwrap();
     let tile = tile(&scan(16, 16, 8), MapKind::Color, BC1);
     let solved = [eight, sixteen].map(|image| {
-        solve(&target(&image, MapKind::Color), &[Layer::new(&tile)], &options(RGBA8), &|_| {})
+        solve(&target(&image, MapKind::Color), &[Layer::new(&tile)], &options(RGBA8), &untold)
             .unwrap()
             .texture
     });
@@ -187,12 +187,12 @@ fn alpha_passes_through() {
     let picture = Image::new(32, 32, Channels::Rgba, Pixels::U8(bytes)).unwrap();
     let tile = tile(&scan(16, 16, 2), MapKind::Color, BC1);
     let target = target(&picture, MapKind::Color);
-    let solved = solve(&target, &[Layer::new(&tile)], &options(RGBA8), &|_| {}).unwrap();
+    let solved = solve(&target, &[Layer::new(&tile)], &options(RGBA8), &untold).unwrap();
     let Pixels::U8(wanted) = &picture.pixels else { unreachable!() };
     for (s, t) in solved.texture.levels[0].data.chunks_exact(4).zip(wanted.chunks_exact(4)) {
         assert_eq!(s[3], t[3]);
     }
-    let error = solve(&target, &[Layer::new(&tile)], &options(BC1), &|_| {}).unwrap_err().to_string();
+    let error = solve(&target, &[Layer::new(&tile)], &options(BC1), &untold).unwrap_err().to_string();
     assert!(error.contains("alpha") && error.contains("BC7"), "{error}");
 }
 
@@ -207,7 +207,7 @@ fn compensation_and_choice_lower_the_blended_error() {
     let target = target(&picture, MapKind::Color);
     let error = |compensate: bool, choose: bool| {
         let options = DetailOptions { compensate, choose, ..options(BC1) };
-        solve(&target, &[layer], &options, &|_| {}).unwrap().levels[1].error
+        solve(&target, &[layer], &options, &untold).unwrap().levels[1].error
     };
     let (neither, compensated, both) = (error(false, false), error(true, false), error(true, true));
     assert!(compensated < neither, "wanted less than {neither}, got {compensated}");
@@ -225,7 +225,7 @@ fn the_finest_level_takes_back_half_of_what_the_tiles_lost() {
     let target = target(&scan(128, 128, 3), MapKind::Color);
     let [none, half] = [0.0, 0.5].map(|finest_compensation| {
         let options = DetailOptions { finest_compensation, ..options(BC1) };
-        compare(&target, &[layer], &options, &|_| {}).unwrap().0
+        compare(&target, &[layer], &options, &untold).unwrap().0
     });
     let at = |c: &kinran_bake::detail::Comparison| (c.levels[0].blended, c.magnified.blended);
     let ((own_none, magnified_none), (own_half, magnified_half)) = (at(&none), at(&half));
@@ -243,7 +243,7 @@ fn the_finest_level_takes_back_half_of_what_the_tiles_lost() {
 fn mips_are_solved_and_not_averaged() {
     let tile = tile(&scan(64, 64, 11), MapKind::Color, BC1);
     let target = target(&scan(64, 64, 3), MapKind::Color);
-    let solved = solve(&target, &[Layer::new(&tile)], &options(RGBA8), &|_| {}).unwrap();
+    let solved = solve(&target, &[Layer::new(&tile)], &options(RGBA8), &untold).unwrap();
     let averaged = |x: usize, y: usize| {
         let fine = &solved.texture.levels[0].data;
         [0, 1, 64, 65].map(|o| u32::from(fine[(y * 2 * 64 + x * 2 + o) * 4])).iter().sum::<u32>() / 4
@@ -261,32 +261,11 @@ fn bytes_do_not_depend_on_threads() {
     let target = target(&scan(130, 70, 3), MapKind::Color);
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| solve(&target, &[Layer::new(&tile)], &options(BC1), &|_| {}).unwrap())
+        pool.install(|| solve(&target, &[Layer::new(&tile)], &options(BC1), &untold).unwrap())
     };
     let (one, four) = (run(1), run(4));
     assert_eq!(one.texture, four.texture);
     assert_eq!(one.levels, four.levels);
-}
-
-/// A bar that stops half-way, or runs on at 100 %.
-#[test]
-fn progress_counts_every_texel_once() {
-    use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-    let told = AtomicU64::new(0);
-    let progress = |texels: u64| {
-        told.fetch_add(texels, Relaxed);
-    };
-    let texels = |side: u64| (0..=side.ilog2()).map(|level| (side >> level).pow(2)).sum::<u64>();
-    let tile = Tile::bake(&scan(128, 128, 11), TileOptions::new(MapKind::Color, BC1), &progress).unwrap();
-    assert_eq!(told.swap(0, Relaxed), texels(128), "of a tile");
-    let (target, layers) = (target(&scan(64, 64, 3), MapKind::Color), [Layer::new(&tile)]);
-    solve(&target, &layers, &options(BC1), &progress).unwrap();
-    assert_eq!(told.swap(0, Relaxed), texels(64), "of a solution");
-    compare(&target, &layers, &options(BC1), &progress).unwrap();
-    assert_eq!(told.swap(0, Relaxed), 5 * texels(64), "of a comparison");
-    bearable_opacity(&target, &layers, &options(BC1), &progress).unwrap();
-    let (faded, most) = (told.swap(0, Relaxed), FADE_TRIALS * (64 * 64 + 32 * 32));
-    assert!(faded > 0 && faded <= most, "of fading: {faded} of {most}");
 }
 
 #[test]
@@ -294,7 +273,7 @@ fn one_level_by_itself_is_the_solvers_own() {
     let tile = tile(&scan(32, 32, 11), MapKind::Color, BC1);
     let target = target(&scan(64, 64, 3), MapKind::Color);
     let options = options(RGBA8);
-    let solved = solve(&target, &[Layer::new(&tile)], &options, &|_| {}).unwrap();
+    let solved = solve(&target, &[Layer::new(&tile)], &options, &untold).unwrap();
     let mut level = Vec::new();
     synthesize(&target, &[Layer::new(&tile)], &options, 1, &mut level).unwrap();
     assert_eq!(level, solved.texture.levels[1].data);
@@ -320,7 +299,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
     ];
     for (wanted, layers) in cases {
-        let error = solve(&target_color, &layers, &options(BC1), &|_| {}).unwrap_err().to_string();
+        let error = solve(&target_color, &layers, &options(BC1), &untold).unwrap_err().to_string();
         assert!(error.contains(wanted), "wanted {wanted}, got {error}");
     }
     let grey = Image::new(4, 4, Channels::R, Pixels::U8(vec![7; 16])).unwrap();
@@ -333,5 +312,5 @@ fn what_cannot_be_meant_is_refused() {
     assert!(error.contains("texel (0, 1) is 1.5"), "{error}");
     let layers = [Layer::new(&color)];
     let too_far = DetailOptions { first_level: 6, ..options(BC1) };
-    assert!(solve(&target_color, &layers, &too_far, &|_| {}).unwrap_err().to_string().contains("6 levels"));
+    assert!(solve(&target_color, &layers, &too_far, &untold).unwrap_err().to_string().contains("6 levels"));
 }

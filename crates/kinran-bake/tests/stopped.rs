@@ -13,6 +13,10 @@ use kinran_bake::aniso::{
     bake_surface,
 };
 use kinran_bake::curvature::{CurvatureError, Mesh, Method, Options, bake_curvature, estimated_normals};
+use kinran_bake::detail::{
+    DetailOptions, FADE_TRIALS, Layer, MapKind, Target, Tile, TileOptions, bearable_opacity, compare,
+    lowest_resolution, solve,
+};
 use kinran_bake::skin_lut::{INTERPOLATION_GRID, Profile, punctual_interpolation_error, punctual_table};
 use kinran_bake::{bake_plain, plain_levels};
 use kinran_image::{
@@ -76,6 +80,31 @@ fn a_stopped_colour_is_baked_on() {
     assert_stops("texture", texels(SIZE), of_image, |tick| {
         bake_plain(&image, Transfer::Srgb, RGBA8, Kernel::Box, wrap, tick)
     });
+}
+
+#[test]
+fn a_stopped_detail_map_is_solved_on() {
+    let bc1 = Encoding { format: Format::Bc1, ..RGBA8 };
+    let (image, kind) = (noise(5), MapKind::Color);
+    let all = texels(SIZE);
+    assert_stops("tile", all, of_image, |tick| Tile::bake(&image, TileOptions::new(kind, bc1), tick));
+
+    let tile = Tile::new(&image, TileOptions::new(kind, bc1)).unwrap();
+    let target = Target::new(&noise(6), kind, false).unwrap();
+    let layers = [Layer::new(&tile)];
+    let options = DetailOptions::new(bc1);
+    assert_stops("solution", all, of_image, |tick| solve(&target, &layers, &options, tick));
+    // Four solutions, and the target by itself.
+    assert_stops("comparison", 5 * all, of_image, |tick| compare(&target, &layers, &options, tick));
+    // Nothing is worse than this bound: every resolution is tried.
+    let of_level = |level| texels((level_size(SIZE.0, level), level_size(SIZE.1, level)));
+    let every = (0..target.levels.len()).map(of_level).sum();
+    assert_stops("resolution", every, of_image, |tick| {
+        lowest_resolution(&target, &layers, &options, f32::INFINITY, tick)
+    });
+    // Noise over other noise is not borne, and no halving of it: every opacity is tried.
+    let faded = FADE_TRIALS * (all - of_level(2));
+    assert_stops("opacity", faded, of_image, |tick| bearable_opacity(&target, &layers, &options, tick));
 }
 
 #[test]

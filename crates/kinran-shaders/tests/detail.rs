@@ -10,7 +10,7 @@ use kinran_bake::detail::{
     DetailOptions, Layer, LayerTransform, MapKind, Mask, Planes, Target, Tile, TileOptions, blend_level,
     solve,
 };
-use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Texture, Transfer};
+use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Texture, Transfer, untold};
 use kinran_shaders::{wgsl, with_needs};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 
@@ -357,7 +357,7 @@ fn the_runtime_does_the_solvers_arithmetic() {
         ] {
             let options = DetailOptions::new(encoding(format));
             let target = Target::new(&scan(64, 9.0, amplitude(kind)), kind, false).unwrap();
-            let solved = solve(&target, &layers, &options, &|_| {}).unwrap();
+            let solved = solve(&target, &layers, &options, &untold).unwrap();
             let text = shader(&layers, kind, &options);
             for level in [0, 1, 2] {
                 let size = (64 >> level, 64 >> level);

@@ -1,7 +1,7 @@
 //! What each part of the method is worth: the talk's table, for one target.
 
 use glam::{Mat2, Vec2, Vec3};
-use kinran_image::{Encoding, Error, Format, Texture};
+use kinran_image::{Cancelled, Encoding, Error, Format, Texture, Tick};
 use kinran_scene::Wrap;
 use kinran_shading::normal_from_xy;
 use rayon::prelude::*;
@@ -13,6 +13,7 @@ use super::map::{MapKind, Planes, compress, decoded_level, synthesized_level};
 use super::operator::Blend;
 use super::sample::Fetch;
 use super::solve::{DetailOptions, Solved, Sums, Target, blend, solve, solve_levels, squared_error};
+use crate::mips::BAND_ROWS;
 
 /// Errors of one level by method, each as [`LevelError::error`](super::LevelError::error).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
@@ -63,8 +64,8 @@ pub struct Comparison {
     pub unique_bytes: u64,
 }
 
-/// Measures a target with `options` (their `blend`, `compensate` and `choose` are varied here). Texels are finished five
-/// times, as far as `progress` is told: four solutions and the compressed target.
+/// Measures a target with `options` (their `blend`, `compensate` and `choose` are varied here). `tick` is told of
+/// their texels five times: of four solutions and of the compressed target.
 ///
 /// # Errors
 /// As [`solve`].
@@ -72,22 +73,22 @@ pub fn compare(
     target: &Target,
     layers: &[Layer],
     options: &DetailOptions,
-    progress: &(impl Fn(u64) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<(Comparison, Solved), Error> {
     let everything =
         DetailOptions { blend: Blend::Smooth, compensate: true, choose: true, measure_all: true, ..*options };
     let talk = DetailOptions { choose: false, finest_compensation: 0.0, ..everything };
     let plain = DetailOptions { blend: Blend::Plain, ..talk };
     let uncompensated = DetailOptions { compensate: false, ..talk };
-    let solved = solve(target, layers, &everything, progress)?;
+    let solved = solve(target, layers, &everything, tick)?;
     let errors = |options: &DetailOptions| -> Result<Vec<f32>, Error> {
-        Ok(solve(target, layers, options, progress)?.levels.iter().map(|level| level.error).collect())
+        Ok(solve(target, layers, options, tick)?.levels.iter().map(|level| level.error).collect())
     };
-    let talk_solved = solve(target, layers, &talk, progress)?;
+    let talk_solved = solve(target, layers, &talk, tick)?;
     let talk: Vec<f32> = talk_solved.levels.iter().map(|level| level.error).collect();
     let (plain, uncompensated) = (errors(&plain)?, errors(&uncompensated)?);
-    let alone = compress(&target.levels[options.first_level..], target.kind, options.encoding, progress)?;
-    let alone_errors = compressed_errors(target, &alone, options.first_level)?;
+    let alone = compress(&target.levels[options.first_level..], target.kind, options.encoding, tick)?;
+    let alone_errors = compressed_errors(target, &alone, options.first_level, tick)?;
     let levels = solved
         .levels
         .iter()
@@ -102,9 +103,10 @@ pub fn compare(
             uncompensated: uncompensated[i],
         })
         .collect();
+    let textures = [&alone, &solved.texture, &talk_solved.texture];
     let comparison = Comparison {
         levels,
-        magnified: magnified(target, layers, &everything, [&alone, &solved.texture, &talk_solved.texture])?,
+        magnified: magnified(target, layers, &everything, textures, tick)?,
         synthesized_bytes: texture_bytes(&solved.texture),
         shared_bytes: layers.iter().map(shared_bytes).sum(),
         target_bytes: texture_bytes(&alone),
@@ -138,25 +140,31 @@ pub(crate) fn solved_errors(
     layers: &[Layer],
     options: &DetailOptions,
     levels: std::ops::Range<usize>,
-    progress: &(impl Fn(u64) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<Vec<f32>, Error> {
-    let solved = solve_levels(target, layers, options, levels, progress)?;
+    let solved = solve_levels(target, layers, options, levels, tick)?;
     Ok(solved.levels.iter().map(|level| level.error).collect())
 }
 
-/// Errors of a compressed target, level by level.
-pub(crate) fn compressed_errors(target: &Target, texture: &Texture, first: usize) -> Result<Vec<f32>, Error> {
+/// Errors of a compressed target, level by level. `tick` is told of no units.
+pub(crate) fn compressed_errors(
+    target: &Target,
+    texture: &Texture,
+    first: usize,
+    tick: &Tick<'_>,
+) -> Result<Vec<f32>, Error> {
     (0..texture.levels.len())
         .map(|level| {
             let decoded = decoded_level(texture, level, target.kind)?;
             let wanted = &target.levels[first + level];
-            Ok(row_errors(target, wanted.height, 1, |y, sums, _| {
+            let measured = row_errors(target, wanted.height, 1, tick, |y, sums, _| {
                 for x in 0..wanted.width as usize {
                     let texel = vector(&decoded, target.kind, x, y);
                     sums.sum += squared_error(texel, vector(wanted, MapKind::Data, x, y), target);
                 }
                 sums.texels += u64::from(wanted.width);
-            }))
+            });
+            Ok(measured?)
         })
         .collect()
 }
@@ -190,7 +198,7 @@ pub struct LowestResolution {
     pub resolutions: Vec<Resolution>,
 }
 
-/// Finds the lowest resolution of `s` with an error of at most `bound` at the target's resolution. `progress` is told of
+/// Finds the lowest resolution of `s` with an error of at most `bound` at the target's resolution. `tick` is told of
 /// texels as in [`solve`]; each resolution has a quarter of those of the one before.
 ///
 /// # Errors
@@ -200,13 +208,13 @@ pub fn lowest_resolution(
     layers: &[Layer],
     options: &DetailOptions,
     bound: f32,
-    progress: &(impl Fn(u64) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<LowestResolution, Error> {
     let mut found = LowestResolution { level: None, resolutions: Vec::new() };
     for first_level in 0..target.levels.len() {
         let options = DetailOptions { first_level, ..*options };
-        let solved = solve(target, layers, &options, progress)?;
-        let error = magnified_error(target, layers, &options, &solved)?;
+        let solved = solve(target, layers, &options, tick)?;
+        let error = magnified_error(target, layers, &options, &solved, tick)?;
         let (width, height) = (solved.levels[0].width, solved.levels[0].height);
         found.resolutions.push(Resolution { width, height, error, bytes: texture_bytes(&solved.texture) });
         if error > bound {
@@ -223,18 +231,20 @@ fn magnified_error(
     layers: &[Layer],
     options: &DetailOptions,
     solved: &Solved,
+    tick: &Tick<'_>,
 ) -> Result<f32, Error> {
     let wanted = &target.levels[0];
     let finest = synthesized_level(&solved.texture, 0)?;
     let size = (wanted.width, wanted.height);
     let blended = Magnified::new(std::slice::from_ref(&finest), layers, target.kind, size, Seen::Decoded);
-    Ok(row_errors(target, size.1, 1, |y, sums, room| {
+    let error = row_errors(target, size.1, 1, tick, |y, sums, room| {
         let row = blended.row(y, options, target.kind, room);
         for (x, texel) in row.into_iter().enumerate() {
             sums.sum += squared_error(texel, vector(wanted, MapKind::Data, x, y), target);
         }
         sums.texels += u64::from(size.0);
-    }))
+    });
+    Ok(error?)
 }
 
 /// Rows of `s`, or of a map without layers, magnified to `size` texels and blended.
@@ -273,6 +283,7 @@ fn magnified(
     layers: &[Layer],
     options: &DetailOptions,
     [alone, blended, talk]: [&Texture; 3],
+    tick: &Tick<'_>,
 ) -> Result<MagnifiedComparison, Error> {
     let first = options.first_level;
     let exact = DetailOptions {
@@ -280,14 +291,14 @@ fn magnified(
         finest_compensation: 0.0,
         ..*options
     };
-    let exact = solve_levels(target, layers, &exact, first..first + 1, &|_| {})?.texture;
+    let exact = solve_levels(target, layers, &exact, first..first + 1, &|_| tick(0))?.texture;
     let wanted = &target.levels[first];
     let size = (wanted.width * 2, wanted.height * 2);
     let kind = target.kind;
     let error = |map: &[Planes], layers: &[Layer], wanted: (&[Planes], Seen)| {
         let map = Magnified::new(map, layers, kind, size, Seen::Decoded);
         let wanted = Magnified::new(wanted.0, layers, kind, size, wanted.1);
-        row_errors(target, size.1, MAGNIFIED_STEP, |y, sums, room| {
+        row_errors(target, size.1, MAGNIFIED_STEP, tick, |y, sums, room| {
             let (a, b) = (map.row(y, options, kind, room), wanted.row(y, options, kind, room));
             for (a, b) in a.into_iter().zip(b) {
                 let a = if kind == MapKind::Normal { normal_from_xy(a.x, a.y) } else { a };
@@ -298,32 +309,40 @@ fn magnified(
     };
     let exact = [synthesized_level(&exact, 0)?];
     let over_tiles = |texture: &Texture| -> Result<f32, Error> {
-        Ok(error(&[synthesized_level(texture, 0)?], layers, (&exact, Seen::Authored)))
+        Ok(error(&[synthesized_level(texture, 0)?], layers, (&exact, Seen::Authored))?)
     };
     Ok(MagnifiedComparison {
-        target: error(&[decoded_level(alone, 0, kind)?], &[], (std::slice::from_ref(wanted), Seen::Authored)),
+        target: error(
+            &[decoded_level(alone, 0, kind)?],
+            &[],
+            (std::slice::from_ref(wanted), Seen::Authored),
+        )?,
         blended: over_tiles(blended)?,
         talk: over_tiles(talk)?,
     })
 }
 
-/// Root mean square of what `measure` adds up over every `step`th row.
+/// Root mean square of what `measure` adds up over every `step`th row. `tick` is told of no units.
 fn row_errors(
     target: &Target,
     rows: u32,
     step: usize,
+    tick: &Tick<'_>,
     measure: impl Fn(usize, &mut Sums, &mut RowRoom) + Sync,
-) -> f32 {
-    let rows: Vec<Sums> = (0..rows as usize)
+) -> Result<f32, Cancelled> {
+    let rows = (0..rows as usize)
         .into_par_iter()
         .step_by(step)
         .map_init(RowRoom::default, |room, y| {
             let mut sums = Sums::default();
             measure(y, &mut sums, room);
-            sums
+            if (y / step).is_multiple_of(BAND_ROWS as usize) {
+                tick(0)?;
+            }
+            Ok(sums)
         })
-        .collect();
+        .collect::<Result<Vec<Sums>, Cancelled>>()?;
     let mut all = Sums::default();
     rows.iter().for_each(|sums| all.add(sums));
-    all.error(target)
+    Ok(all.error(target))
 }

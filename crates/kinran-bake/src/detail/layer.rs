@@ -1,7 +1,7 @@
 //! Tiles, and the layers they are laid in.
 
 use glam::{Mat2, Vec2, Vec3, vec2, vec3};
-use kinran_image::{Encoding, Error, Image, Texture, full_level_count};
+use kinran_image::{Encoding, Error, Image, Texture, Tick, full_level_count, untold};
 use kinran_scene::{LayerTransform, Wrap};
 use kinran_shading::detail::{
     detail_mask, detail_mirror, detail_turn_aniso, detail_turn_normal, detail_uv, hsv_shift,
@@ -57,25 +57,21 @@ impl Tile {
     /// [`Error::Unsupported`] where a sample lies outside [0, 1], the kind asks for more channels than the image has,
     /// or the encoder refuses.
     pub fn new(image: &Image, options: TileOptions) -> Result<Self, Error> {
-        Tile::bake(image, options, &|_| {})
+        Tile::bake(image, options, &untold)
     }
 
-    /// [`new`](Tile::new), which tells `progress` how many texels of all levels were finished since it was last called.
+    /// [`new`](Tile::new), which tells `tick` of texels of all levels.
     ///
     /// # Errors
-    /// As [`new`](Tile::new).
-    pub fn bake(
-        image: &Image,
-        options: TileOptions,
-        progress: &(impl Fn(u64) + Sync),
-    ) -> Result<Self, Error> {
+    /// As [`new`](Tile::new), and [`Error::Cancelled`] where `tick` stops it.
+    pub fn bake(image: &Image, options: TileOptions, tick: &Tick<'_>) -> Result<Self, Error> {
         let TileOptions { kind, encoding, y_down, center } = options;
         let mut finest = planes_of_image(image, kind, y_down)?;
         if center && matches!(kind, MapKind::Color | MapKind::Data) {
             center_histogram(&mut finest);
         }
-        let authored = mip_chain(finest, kind);
-        let texture = compress(&authored, kind, encoding, progress)?;
+        let authored = mip_chain(finest, kind, &|_| tick(0))?;
+        let texture = compress(&authored, kind, encoding, tick)?;
         let decoded = decode_levels(&texture, kind)?;
         Ok(Tile { kind, texture, authored, decoded })
     }

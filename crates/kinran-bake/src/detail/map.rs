@@ -1,17 +1,16 @@
 //! Maps as planes of the numbers a sampler filters, level by level.
 
-use std::convert::Infallible;
-
 use kinran_image::srgb::{byte_from_linear, linear_from_byte, linear_from_srgb, linear_of_codes};
 use kinran_image::{
-    Channels, Encoding, Error, Format, Image, Level, Pixels, Texture, Transfer, encode, level_size,
+    Cancelled, Channels, Encoding, Error, Format, Image, Level, Pixels, Texture, Tick, Transfer, encode,
+    level_size,
 };
 use kinran_scene::Wrap;
 use kinran_shading::normal_from_xy;
 use rayon::prelude::*;
 
 use crate::aniso::{Kernel, Taps};
-use crate::mips::{PlaneRows, TILE, reduce_levels, unorm8};
+use crate::mips::{BAND_ROWS, PlaneRows, TILE, reduce_levels, unorm8};
 
 /// What a map holds, which decides how it is blended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -152,12 +151,13 @@ impl PlaneRows for Planes {
 }
 
 /// A map's mip chain down to 1×1, every level an average of level 0 (a box, which does not reach over borders). Normals are averaged as vectors and made unit
-/// length again.
-pub(crate) fn mip_chain(finest: Planes, kind: MapKind) -> Vec<Planes> {
+/// length again. `tick` is told of no units.
+pub(crate) fn mip_chain(finest: Planes, kind: MapKind, tick: &Tick<'_>) -> Result<Vec<Planes>, Cancelled> {
     let size = (finest.width, finest.height);
-    let Ok(coarser) = reduce_levels(&finest, size, Kernel::Box, [Wrap::Repeat; 2], |band, (): &mut ()| {
-        Ok::<_, Infallible>((band.y0, band.samples.to_vec()))
-    });
+    let coarser = reduce_levels(&finest, size, Kernel::Box, [Wrap::Repeat; 2], |band, (): &mut ()| {
+        tick(0)?;
+        Ok::<_, Cancelled>((band.y0, band.samples.to_vec()))
+    })?;
     let coarser: Vec<Planes> = coarser
         .into_iter()
         .enumerate()
@@ -183,7 +183,7 @@ pub(crate) fn mip_chain(finest: Planes, kind: MapKind) -> Vec<Planes> {
             planes
         })
         .collect();
-    std::iter::once(finest).chain(coarser).collect()
+    Ok(std::iter::once(finest).chain(coarser).collect())
 }
 
 /// The 8-bit texels of a level of a tile or a target.
@@ -205,30 +205,27 @@ pub(crate) fn bytes_of_planes(planes: &Planes, kind: MapKind) -> Vec<u8> {
     bytes
 }
 
-/// Rows that are compressed at a time: whole blocks.
-const BAND: usize = 64;
-
-/// A map's chain, compressed, in parallel; `progress` is told how many texels were finished since it was last called.
+/// A map's chain, compressed, in parallel; `tick` is told of texels of all levels.
 ///
 /// # Errors
-/// [`Error::Unsupported`] where the encoder refuses.
+/// [`Error::Unsupported`] where the encoder refuses, [`Error::Cancelled`] where `tick` does.
 pub(crate) fn compress(
     levels: &[Planes],
     kind: MapKind,
     encoding: Encoding,
-    progress: &(impl Fn(u64) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<Texture, Error> {
     let levels = levels
         .iter()
         .map(|planes| {
             let width = planes.width as usize;
             let bands: Vec<Vec<u8>> = bytes_of_planes(planes, kind)
-                .par_chunks(width * 4 * BAND)
+                .par_chunks(width * 4 * BAND_ROWS as usize)
                 .map(|band| {
                     let rows = band.len() / (4 * width);
-                    let blocks = encode(encoding, band, planes.width, rows as u32);
-                    progress((width * rows) as u64);
-                    blocks
+                    let blocks = encode(encoding, band, planes.width, rows as u32)?;
+                    tick((width * rows) as u64)?;
+                    Ok(blocks)
                 })
                 .collect::<Result<_, Error>>()?;
             Ok(Level { width: planes.width, height: planes.height, data: bands.concat() })

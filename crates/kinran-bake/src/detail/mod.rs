@@ -3,14 +3,14 @@
 //!
 //! ```no_run
 //! # use kinran_bake::detail::*;
-//! # use kinran_image::{Encoder, Encoding, Format, Preset, read_image};
+//! # use kinran_image::{Encoder, Encoding, Format, Preset, read_image, untold};
 //! # fn main() -> Result<(), kinran_image::Error> {
 //! let bc1 = Encoding { format: Format::Bc1, encoder: Encoder::Portable, preset: Preset::Normal };
 //! let tile = Tile::new(&read_image("steel.png".as_ref())?, TileOptions::new(MapKind::Color, bc1))?;
 //! let target = Target::new(&read_image("helmet.png".as_ref())?, MapKind::Color, false)?;
 //! let mut layer = Layer::new(&tile);
 //! layer.transform.scale = glam::Vec2::splat(4.0);
-//! let solved = solve(&target, &[layer], &DetailOptions::new(bc1), &|_| {})?;
+//! let solved = solve(&target, &[layer], &DetailOptions::new(bc1), &untold)?;
 //! println!("RMSE {}", solved.levels[0].error);
 //! # Ok(())
 //! # }

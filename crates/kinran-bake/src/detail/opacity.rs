@@ -1,6 +1,6 @@
 //! How much of the tiles a target bears.
 
-use kinran_image::Error;
+use kinran_image::{Error, Tick};
 
 use super::compare::{compressed_errors, solved_errors};
 use super::layer::Layer;
@@ -20,7 +20,7 @@ pub const FADE_TRIALS: u64 = HALVINGS as u64 + 2;
 /// own grain: blended error grows with the tile's contrast. At opacity 0 there is no tile left, and `s` is the target
 /// in blocks that were chosen by what they look like.
 ///
-/// The two levels are solved at most [`FADE_TRIALS`] times, and `progress` is told of their texels as in
+/// The two levels are solved at most [`FADE_TRIALS`] times, and `tick` is told of their texels as in
 /// [`solve`](fn@super::solve).
 ///
 /// # Errors
@@ -29,16 +29,16 @@ pub fn bearable_opacity(
     target: &Target,
     layers: &[Layer],
     options: &DetailOptions,
-    progress: &(impl Fn(u64) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<Option<f32>, Error> {
     let options = &DetailOptions { measure_all: true, ..*options };
     let finest = options.first_level..target.levels.len().min(options.first_level + 2);
-    let alone = compress(&target.levels[finest.clone()], target.kind, options.encoding, &|_| {})?;
-    let alone = compressed_errors(target, &alone, options.first_level)?;
+    let alone = compress(&target.levels[finest.clone()], target.kind, options.encoding, &|_| tick(0))?;
+    let alone = compressed_errors(target, &alone, options.first_level, tick)?;
     let bears = |factor: f32| -> Result<bool, Error> {
         let layers: Vec<Layer> =
             layers.iter().map(|layer| Layer { opacity: layer.opacity * factor, ..*layer }).collect();
-        let errors = solved_errors(target, &layers, options, finest.clone(), progress)?;
+        let errors = solved_errors(target, &layers, options, finest.clone(), tick)?;
         Ok(errors.iter().zip(&alone).all(|(blended, alone)| blended <= alone))
     };
     if bears(1.0)? {

@@ -3,7 +3,7 @@
 use glam::{Vec3, Vec4, vec3};
 use kinran_image::srgb::{byte_from_linear, code_from_linear, linear_from_byte};
 use kinran_image::{
-    Channels, Encoding, Error, Format, Image, Level, Pixels, Texture, Transfer, decode, encode,
+    Channels, Encoding, Error, Format, Image, Level, Pixels, Texture, Tick, Transfer, decode, encode, untold,
 };
 use kinran_shading::detail::{
     detail_from_texel, detail_over, detail_over_inverse, overlay_color, rnm, rnm_inverse,
@@ -90,7 +90,7 @@ impl Target {
     /// # Errors
     /// [`Error::Unsupported`] where a sample lies outside [0, 1] or the kind asks for more channels than the image has.
     pub fn new(image: &Image, kind: MapKind, y_down: bool) -> Result<Self, Error> {
-        let levels = mip_chain(planes_of_image(image, kind, y_down)?, kind);
+        let levels = mip_chain(planes_of_image(image, kind, y_down)?, kind, &untold)?;
         let grey = kind == MapKind::Data && matches!(image.channels, Channels::R | Channels::Rg);
         let alpha =
             matches!(kind, MapKind::Color | MapKind::Data) && levels[0].plane(3).iter().any(|&a| a < 1.0);
@@ -169,19 +169,19 @@ const BAND: usize = 16;
 /// Bands per level whose errors are measured, unless all are.
 const MEASURED_BANDS: usize = 8;
 
-/// Solves a target against its layers, all levels from `options.first_level` down, in parallel; `progress` is told how
-/// many texels were finished since it was last called. The bytes do not depend on the number of threads.
+/// Solves a target against its layers, all levels from `options.first_level` down, in parallel; `tick` is told of
+/// their texels. The bytes do not depend on the number of threads.
 ///
 /// # Errors
 /// [`Error::Unsupported`] where layers and target do not fit together, an option is out of range, the format cannot
-/// hold the kind, or the encoder refuses.
+/// hold the kind, or the encoder refuses; [`Error::Cancelled`] where `tick` does.
 pub fn solve(
     target: &Target,
     layers: &[Layer],
     options: &DetailOptions,
-    progress: &(impl Fn(u64) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<Solved, Error> {
-    solve_levels(target, layers, options, options.first_level..target.levels.len(), progress)
+    solve_levels(target, layers, options, options.first_level..target.levels.len(), tick)
 }
 
 /// Some of the levels.
@@ -190,7 +190,7 @@ pub(crate) fn solve_levels(
     layers: &[Layer],
     options: &DetailOptions,
     range: std::ops::Range<usize>,
-    progress: &(impl Fn(u64) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<Solved, Error> {
     check_layers(layers, target.kind)?;
     target.check_format(options.encoding.format)?;
@@ -208,7 +208,7 @@ pub(crate) fn solve_levels(
         )));
     }
 
-    let transfer = better_transfer(target, layers, options)?;
+    let transfer = better_transfer(target, layers, options, tick)?;
     let mut levels = Vec::new();
     let mut errors = Vec::new();
     for level in range {
@@ -217,7 +217,7 @@ pub(crate) fn solve_levels(
             (true, false) => options.finest_compensation,
             (true, true) => 1.0,
         };
-        let (data, error) = solve_level(target, layers, options, level, (compensation, transfer), progress)?;
+        let (data, error) = solve_level(target, layers, options, level, (compensation, transfer), tick)?;
         let (width, height) = (target.levels[level].width, target.levels[level].height);
         levels.push(Level { width, height, data });
         errors.push(error);
@@ -259,8 +259,13 @@ pub fn synthesize(
 /// Levels below the finest where both ways to store colour are tried: a 64th of the texels.
 const TRIAL_LEVEL: usize = 3;
 
-/// How colour is stored with the lower error.
-fn better_transfer(target: &Target, layers: &[Layer], options: &DetailOptions) -> Result<Transfer, Error> {
+/// How colour is stored with the lower error. `tick` is told of no units.
+fn better_transfer(
+    target: &Target,
+    layers: &[Layer],
+    options: &DetailOptions,
+    tick: &Tick<'_>,
+) -> Result<Transfer, Error> {
     if target.kind != MapKind::Color {
         return Ok(Transfer::Linear);
     }
@@ -271,7 +276,7 @@ fn better_transfer(target: &Target, layers: &[Layer], options: &DetailOptions) -
     let error = |transfer| -> Result<f32, Error> {
         let options = &DetailOptions { measure_all: true, ..*options };
         let compensation = if options.compensate { 1.0 } else { 0.0 };
-        Ok(solve_level(target, layers, options, level, (compensation, transfer), &|_| {})?.1.error)
+        Ok(solve_level(target, layers, options, level, (compensation, transfer), &|_| tick(0))?.1.error)
     };
     let (linear, srgb) = (error(Transfer::Linear)?, error(Transfer::Srgb)?);
     Ok(if srgb < linear { Transfer::Srgb } else { Transfer::Linear })
@@ -283,14 +288,14 @@ fn solve_level(
     options: &DetailOptions,
     level: usize,
     (compensation, transfer): (f32, Transfer),
-    progress: &(impl Fn(u64) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<(Vec<u8>, LevelError), Error> {
     let planes = &target.levels[level];
     let (width, height) = (planes.width, planes.height);
     let decoded = DetailRows::new(layers, target.kind, (width, height), Seen::Decoded);
     let authored =
         (compensation < 1.0).then(|| DetailRows::new(layers, target.kind, (width, height), Seen::Authored));
-    let bands: Vec<Result<(Vec<u8>, Sums), Error>> = (0..height as usize)
+    let bands = (0..height as usize)
         .into_par_iter()
         .step_by(BAND)
         .map_init(RowRoom::default, |room, y0| {
@@ -298,14 +303,13 @@ fn solve_level(
             let srgb = transfer == Transfer::Srgb;
             let mut band =
                 Band { planes, target, options, compensation, srgb, y0, rows, sums: Sums::default() };
-            let result = band.solve(&decoded, authored.as_ref(), room);
-            progress(u64::from(width) * rows as u64);
-            result
+            let solved = band.solve(&decoded, authored.as_ref(), room)?;
+            tick(u64::from(width) * rows as u64)?;
+            Ok(solved)
         })
-        .collect();
+        .collect::<Result<Vec<_>, Error>>()?;
     let (mut data, mut sums) = (Vec::new(), Sums::default());
-    for band in bands {
-        let (bytes, band_sums) = band?;
+    for (bytes, band_sums) in bands {
         data.extend(bytes);
         sums.add(&band_sums);
     }

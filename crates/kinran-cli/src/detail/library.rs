@@ -15,7 +15,7 @@ use kinran_bake::detail::{
 };
 use kinran_bake::folder::{Green, Role, named_maps};
 use kinran_image::{
-    Channels, Encoding, Image, Level, Pixels, encode_png, read_layer, untold, write_atomically,
+    Channels, Encoding, Image, Level, Pixels, Tick, encode_png, read_layer, untold, write_atomically,
 };
 use kinran_scene::Wrap;
 use rayon::prelude::*;
@@ -237,11 +237,11 @@ pub fn report_library(args: &LibraryArgs, console: &Console) -> Result<LibraryRe
             for (n, format) in formats_of(map, &formats).iter().enumerate() {
                 let shown = (!args.no_pictures && n == 0).then_some(pictures.as_path());
                 let done = AtomicU64::new(0);
-                let progress = |texels| {
+                let tick = |texels| {
                     done.fetch_add(texels, Ordering::Relaxed);
-                    stage.add(texels);
+                    stage.tick(texels)
                 };
-                report.rows.extend(solve_map(args, &materials, i, map, *format, shown, &progress)?);
+                report.rows.extend(solve_map(args, &materials, i, map, *format, shown, &tick)?);
                 // What turned out not to be needed.
                 stage.add(texels(args, map).saturating_sub(done.into_inner()));
             }
@@ -282,7 +282,7 @@ fn solve_map(
     map: &MapFile,
     format: BlockFormat,
     pictures: Option<&Path>,
-    progress: &(impl Fn(u64) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<Vec<LibraryRow>, Error> {
     let material = &materials[index];
     let encoding = format.encoding();
@@ -339,7 +339,7 @@ fn solve_map(
     let options = DetailOptions::new(encoding);
     let mut rows = Vec::new();
     let mut solve = |layers: &[Layer], tiles: Vec<String>, against: Against| -> Result<(), Error> {
-        let (comparison, solved) = compare(&target, layers, &options, progress)?;
+        let (comparison, solved) = compare(&target, layers, &options, tick)?;
         if let Some(folder) = pictures {
             let shown = level_pictures(&target, layers, &options, &solved, 1)?;
             let side = 256.min(args.size / 2);
@@ -380,7 +380,7 @@ fn solve_map(
         // An aniso map has an opacity of its own.
         if !args.no_fade
             && map.kind != MapKind::Aniso
-            && let Some(opacity) = bearable_opacity(&target, &[layer], &options, progress)?
+            && let Some(opacity) = bearable_opacity(&target, &[layer], &options, tick)?
         {
             solve(&[Layer { opacity, ..layer }], name, Against::Faded)?;
         }

@@ -413,7 +413,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     if args.fade {
         // Two levels at a time.
         let stage = console.progress().stage("fading the layers", FADE_TRIALS * texels * 5 / 4);
-        let found = bearable_opacity(&target, &layers, &options, &|n| stage.add(n))?.ok_or_else(|| {
+        let found = bearable_opacity(&target, &layers, &options, &|n| stage.tick(n))?.ok_or_else(|| {
             Error::flag_error_of(
                 &args.target,
                 "--fade",
@@ -427,7 +427,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     if let Some(bound) = args.max_error {
         // All resolutions together are a third more than the first, and so are the mips of each.
         let stage = console.progress().stage("trying resolutions", texels * 16 / 9);
-        let found = lowest_resolution(&target, &layers, &options, bound, &|n| stage.add(n))?;
+        let found = lowest_resolution(&target, &layers, &options, bound, &|n| stage.tick(n))?;
         resolutions = found.resolutions;
         let Some(level) = found.level else {
             let reason = format!(
@@ -442,11 +442,11 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     let all = u64::from(finest.width) * u64::from(finest.height) * 4 / 3;
     let (solved, comparison) = if args.compare {
         let stage = console.progress().stage("solving and comparing", 5 * all);
-        let (comparison, solved) = compare(&target, &layers, &options, &|n| stage.add(n))?;
+        let (comparison, solved) = compare(&target, &layers, &options, &|n| stage.tick(n))?;
         (solved, Some(comparison))
     } else {
         let stage = console.progress().stage("solving", all);
-        (solve(&target, &layers, &options, &|n| stage.add(n))?, None)
+        (solve(&target, &layers, &options, &|n| stage.tick(n))?, None)
     };
 
     let stem = file_stem(&args.target);
@@ -545,7 +545,7 @@ fn read_tiles(
                     }
                     let texels = u64::from(image.width) * u64::from(image.height) * 4 / 3;
                     let stage = console.progress().stage(format!("compressing {}", file_name(file)), texels);
-                    Tile::bake(&image, options, &|n| stage.add(n))
+                    Tile::bake(&image, options, &|n| stage.tick(n))
                 })
             };
             tiles.insert(key, named(file, tile)?);
