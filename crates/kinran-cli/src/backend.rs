@@ -95,9 +95,9 @@ impl Painter {
                 drop(loading);
                 let stage = progress.stage(name, u64::from(samples_per_pixel));
                 let (settings, samples) = (settings(view), samples_per_pixel);
-                Ok(renderer.film(&scene, &view.camera, &settings, view.size, samples, &|_, _| {
-                    stage.add(1);
-                    progress.drawn(samples_of(view.size, 1));
+                Ok(renderer.film(&scene, &view.camera, &settings, view.size, samples, &|frames| {
+                    progress.drawn(frames * samples_of(view.size, 1));
+                    stage.tick(frames)
                 })?)
             }
         }

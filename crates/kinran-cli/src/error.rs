@@ -159,6 +159,9 @@ impl Error {
             Error::Image(error)
             | Error::Folder(FolderError::Image(error))
             | Error::Scene(kinran_scene::Error::Image(error)) => of_image(error),
+            Error::Scene(kinran_scene::Error::Cancelled(_)) | Error::Render(RenderError::Cancelled(_)) => {
+                "cancelled"
+            }
             Error::Scene(kinran_scene::Error::Io { .. }) | Error::Stdout(_) => "io",
             Error::Scene(kinran_scene::Error::Malformed { .. }) => "malformed",
             Error::Scene(kinran_scene::Error::Unsupported { .. }) => "unsupported",

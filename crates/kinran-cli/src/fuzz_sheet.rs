@@ -462,7 +462,7 @@ impl Studio<'_> {
                 (material.metallic_roughness, material.surface) = (None, None);
             }
         }
-        scene.fit_fuzz(|phase, spread| fuzz_fits(phase, spread, self.progress));
+        scene.fit_fuzz(|phase, spread| fuzz_fits(phase, spread, self.progress))?;
         scene.lights.clone_from(&shot.view.lights);
         scene.surroundings = shot.view.environment.clone().map(|e| Arc::new(Surroundings::new(e)));
         let filtering = TextureFiltering::Mips { max_anisotropy: 16 };

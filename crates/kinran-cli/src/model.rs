@@ -195,11 +195,8 @@ pub(crate) fn read_scene(
     progress: &Progress,
 ) -> Result<Scene, Error> {
     let reading = progress.busy(format!("reading {}", file_name(path)));
-    let watch = |expected, done| {
-        reading.expect(expected);
-        reading.add(done);
-    };
-    Ok(Scene::load_watched(path, args.allowed()?, needs, &watch)?)
+    let expect = |units| reading.expect(units);
+    Ok(Scene::load_watched(path, args.allowed()?, needs, &expect, &|units| reading.tick(units))?)
 }
 
 /// A board for each material of the sidecars, side by side along x, facing +z.

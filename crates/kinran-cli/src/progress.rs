@@ -18,8 +18,8 @@ const LINE_STEP: Duration = Duration::from_secs(3);
 /// Works that such a line names.
 const NAMED: usize = 3;
 
-/// Is told what is being done, and which share of it is.
-type Watch = Arc<dyn Fn(&str, f32) + Send + Sync>;
+/// Is told what is being done, and which share of it is; says whether to go on.
+type Watch = Arc<dyn Fn(&str, f32) -> Result<(), Cancelled> + Send + Sync>;
 
 /// Makes the progress bars of a command.
 #[derive(Clone, Default)]
@@ -88,8 +88,8 @@ impl Progress {
         Progress { board, ..Progress::default() }
     }
 
-    /// No bars; `watch` is told instead, from any thread and often.
-    pub fn watched(watch: impl Fn(&str, f32) + Send + Sync + 'static) -> Self {
+    /// No bars; `watch` is told instead, from any thread and often, and stops the work by an error.
+    pub fn watched(watch: impl Fn(&str, f32) -> Result<(), Cancelled> + Send + Sync + 'static) -> Self {
         Progress { watch: Some(Arc::new(watch)), ..Progress::default() }
     }
 
@@ -165,22 +165,20 @@ impl Stage {
         self.work.total.fetch_add(units, Ordering::Relaxed);
     }
 
-    /// [`Stage::add`] as work that can be stopped calls it.
+    /// Counts `units` more as done, of work that can be stopped; from any thread.
     ///
     /// # Errors
-    /// Never.
+    /// Where who watches the work stops it.
     pub fn tick(&self, units: u64) -> Result<(), Cancelled> {
-        self.add(units);
-        Ok(())
+        let done = self.work.done.fetch_add(units, Ordering::Relaxed) + units;
+        let Some(watch) = &self.watch else { return Ok(()) };
+        let total = self.work.total.load(Ordering::Relaxed).max(1);
+        watch(&self.work.name, done as f32 / total as f32)
     }
 
-    /// Counts `units` more as done; from any thread.
+    /// Counts `units` more as done, of work that goes on to its end; from any thread.
     pub fn add(&self, units: u64) {
-        let done = self.work.done.fetch_add(units, Ordering::Relaxed) + units;
-        if let Some(watch) = &self.watch {
-            let total = self.work.total.load(Ordering::Relaxed).max(1);
-            watch(&self.work.name, done as f32 / total as f32);
-        }
+        let _ = self.tick(units);
     }
 }
 

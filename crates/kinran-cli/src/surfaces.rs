@@ -10,7 +10,7 @@ use kinran_bake::aniso::{
 };
 use kinran_bake::fuzz_fit::{FuzzFit, Phase, ambient_texels, fuzz_fit};
 use kinran_bake::{NoSurface, material_surface};
-use kinran_image::{Format, Role, Texture, full_level_count, level_size};
+use kinran_image::{Cancelled, Format, Role, Texture, full_level_count, level_size};
 use kinran_render::reference::{
     AnisoEncoding, BoundTexture, FUZZ_TILTS, FuzzCoefficients, FuzzFits, MipLevel, MipTexture,
     SurfaceTextures,
@@ -261,13 +261,16 @@ fn separate_surface(
 
 /// Coefficients of layers of fibres, for [`RenderScene::fit_fuzz`](kinran_render::reference::RenderScene::fit_fuzz): some
 /// 200 ms of one core, and 1.6 s more for combed fibres. The last ones are kept.
-pub fn fuzz_fits(phase: FuzzPhase, spread: f32, progress: &Progress) -> Arc<FuzzFits> {
+///
+/// # Errors
+/// Where `progress` stops the work.
+pub fn fuzz_fits(phase: FuzzPhase, spread: f32, progress: &Progress) -> Result<Arc<FuzzFits>, Cancelled> {
     static LAST: Mutex<Option<(FuzzPhase, f32, Arc<FuzzFits>)>> = Mutex::new(None);
     let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((of, at, fits)) = &*last
         && (*of, *at) == (phase, spread)
     {
-        return fits.clone();
+        return Ok(fits.clone());
     }
     let named = match phase {
         FuzzPhase::Fibre => Phase::Fibre,
@@ -276,21 +279,21 @@ pub fn fuzz_fits(phase: FuzzPhase, spread: f32, progress: &Progress) -> Arc<Fuzz
     let tilts: Vec<f64> = (0..FUZZ_TILTS).map(|i| FRAC_PI_2 * i as f64 / (FUZZ_TILTS - 1) as f64).collect();
     let combed = fuzz_alpha(spread) < FUZZ_COMBED_ALPHA;
     let stage = progress.stage("fitting fuzz", if combed { 2 } else { 1 } * FUZZ_TILTS as u64);
-    let fits: Vec<FuzzFit> = (tilts.par_iter())
+    let fits = (tilts.par_iter())
         .map(|&tilt| {
             let fit = fuzz_fit(named, tilt, spread.into());
-            stage.add(1);
-            fit
+            stage.tick(1)?;
+            Ok(fit)
         })
-        .collect();
-    let table = combed.then(|| {
-        let texels = |&tilt: &f64| {
+        .collect::<Result<Vec<FuzzFit>, Cancelled>>()?;
+    let tables = (tilts.par_iter().filter(|_| combed))
+        .map(|&tilt| {
             let texels = ambient_texels(named, tilt, spread.into());
-            stage.add(1);
-            texels
-        };
-        tilts.par_iter().flat_map_iter(texels).collect()
-    });
+            stage.tick(1)?;
+            Ok(texels)
+        })
+        .collect::<Result<Vec<_>, Cancelled>>()?;
+    let table = combed.then(|| tables.concat());
     let tilts = std::array::from_fn(|i| FuzzCoefficients {
         p_s: fits[i].p_s.coefficients,
         ambient: fits[i].ambient.coefficients,
@@ -299,5 +302,5 @@ pub fn fuzz_fits(phase: FuzzPhase, spread: f32, progress: &Progress) -> Arc<Fuzz
     });
     let fits = Arc::new(FuzzFits { tilts, table });
     *last = Some((phase, spread, fits.clone()));
-    fits
+    Ok(fits)
 }

@@ -336,7 +336,7 @@ impl View {
         let preparing = progress.busy("preparing the scene");
         let mut prepared = RenderScene::new(scene, surfaces, self.environment.clone())?;
         drop(preparing);
-        prepared.fit_fuzz(|phase, spread| fuzz_fits(phase, spread, progress));
+        prepared.fit_fuzz(|phase, spread| fuzz_fits(phase, spread, progress))?;
         prepared.lights.clone_from(&self.lights);
         attach_skin(scene, &mut prepared, &self.skin, progress)?;
         prepared.materials.iter_mut().filter_map(|m| m.detail.as_mut()).for_each(|d| d.shown = self.detail);
@@ -382,15 +382,11 @@ impl View {
             shadows: self.shadows,
             background: self.background,
         };
-        let tiles = u64::from(self.size.0.div_ceil(16)) * u64::from(self.size.1.div_ceil(16));
-        let stage = progress.stage(name, tiles);
-        let all = samples_of(self.size, samples.count);
-        let film = render(scene, &self.camera, &settings, &|_, _| {
-            stage.add(1);
-            progress.drawn(all / tiles);
-        })?;
-        progress.drawn(all % tiles);
-        Ok(film)
+        let stage = progress.stage(name, samples_of(self.size, 1));
+        Ok(render(scene, &self.camera, &settings, &|pixels| {
+            progress.drawn(pixels * u64::from(samples.count));
+            stage.tick(pixels)
+        })?)
     }
 
     /// A film as a display shows it.

@@ -233,7 +233,7 @@ fn between_the_tilts_of_a_fit_its_error_stays_within_what_is_stated() {
 
     let mut stated = Vec::new();
     for (spread, low, high) in [(0.01, 0.93, 1.3), (0.04, 0.95, 1.1), (0.09, 0.8, 1.2), (0.2, 0.9, 1.1)] {
-        let fits = fuzz_fits(FuzzPhase::Fibre, spread, &Progress::default());
+        let fits = fuzz_fits(FuzzPhase::Fibre, spread, &Progress::default()).unwrap();
         let mut range = (f64::INFINITY, 0.0f64);
         let mut dark = 0.0f64;
         // Halfway between neighbours, and a third from one.
@@ -273,6 +273,7 @@ mod realtime {
     use glam::{Affine3A, Vec3, vec2, vec3};
     use kinran_cli::Progress;
     use kinran_cli::surfaces::fuzz_fits;
+    use kinran_image::untold;
     use kinran_render::metrics::flip;
     use kinran_render::realtime::{Gpu, Realtime, Settings as GpuSettings, ShaderSource};
     use kinran_render::reference::{Background, RenderScene, Settings, TextureFiltering, look_at, render};
@@ -336,7 +337,7 @@ mod realtime {
             range: f32::INFINITY,
         }));
         let mut prepared = RenderScene::new(&scene, vec![None], environment).unwrap();
-        prepared.fit_fuzz(|phase, spread| fuzz_fits(phase, spread, &Progress::default()));
+        prepared.fit_fuzz(|phase, spread| fuzz_fits(phase, spread, &Progress::default())).unwrap();
         prepared
     }
 
@@ -352,11 +353,11 @@ mod realtime {
             background,
             ..Settings::default()
         };
-        let wanted = render(scene, &camera, &settings, &|_, _| {}).unwrap();
+        let wanted = render(scene, &camera, &settings, &untold).unwrap();
         let settings = GpuSettings { shadows: false, background, ..GpuSettings::default() };
         let loaded =
             renderer.load(scene, &renderer.light_of(scene), TextureFiltering::Mips { max_anisotropy: 16 });
-        let got = renderer.film(&loaded, &camera, &settings, (SIZE, SIZE), 16, &|_, _| {}).unwrap();
+        let got = renderer.film(&loaded, &camera, &settings, (SIZE, SIZE), 16, &untold).unwrap();
         let shown = |pixels: &[[f32; 3]]| to_srgb8(pixels, 0.0, Tonemap::Aces);
         flip(&shown(&wanted.pixels), &shown(&got.pixels), SIZE, SIZE).unwrap().mean
     }

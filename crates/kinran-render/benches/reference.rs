@@ -5,6 +5,7 @@
 
 use divan::{Bencher, counter::ItemsCount};
 use glam::{Mat3, Vec3};
+use kinran_image::untold;
 use kinran_render::reference::{
     Background, BoundTexture, CameraRay, Geometry, MipLevel, MipTexture, PictureCamera, RenderScene,
     Settings, SurfaceTextures, TextureFiltering, look_at, render,
@@ -102,6 +103,6 @@ fn shaded_samples(bencher: Bencher<'_, '_>, what: &str) {
     let camera = camera();
     let one_core = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     bencher.counter(ItemsCount::new(4 * (SIZE * SIZE) as usize)).bench_local(|| {
-        one_core.install(|| render(&scene, &camera, &settings, &|_, _| {}).expect("valid settings"))
+        one_core.install(|| render(&scene, &camera, &settings, &untold).expect("valid settings"))
     });
 }

@@ -1,3 +1,5 @@
+use kinran_image::Cancelled;
+
 /// Why a picture could not be rendered or compared.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
@@ -28,4 +30,7 @@ pub enum Error {
         /// Pixels of the second.
         b: usize,
     },
+    /// A [`Tick`](kinran_image::Tick) stopped the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }

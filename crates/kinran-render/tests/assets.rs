@@ -4,7 +4,7 @@
 mod sample_assets;
 
 use glam::{Vec2, Vec3, vec2, vec3};
-use kinran_image::Transfer;
+use kinran_image::{Transfer, untold};
 use kinran_render::reference::{
     Background, BoundTexture, Film, MipLevel, MipTexture, RenderScene, Settings, SurfaceTextures,
     TextureFiltering, look_at, render,
@@ -67,7 +67,7 @@ fn front(scene: &RenderScene, centre: Vec3, unit: f32) -> Film {
         background: Background::Color(Vec3::ZERO),
         ..Settings::default()
     };
-    render(scene, &camera, &settings, &|_, _| {}).unwrap()
+    render(scene, &camera, &settings, &untold).unwrap()
 }
 
 /// The rectangle of a picture from [`front`] around a place, in units from its centre, +y up.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Mat3, Vec2, Vec3, vec2, vec3};
-use kinran_image::{Channels, Image, Pixels};
+use kinran_image::{Channels, Image, Pixels, untold};
 use kinran_render::reference::{
     Background, BoundTexture, DetailShown, Film, MipTexture, RenderScene, Settings, SurfaceTextures, look_at,
     render,
@@ -53,7 +53,7 @@ fn drawn(scene: &RenderScene, size: u32, eye: Vec3, samples: u32) -> Film {
         background: Background::Color(Vec3::ZERO),
         ..Settings::default()
     };
-    render(scene, &look_at(eye, Vec3::ZERO, Vec3::Y, 0.6), &settings, &|_, _| {}).unwrap()
+    render(scene, &look_at(eye, Vec3::ZERO, Vec3::Y, 0.6), &settings, &untold).unwrap()
 }
 
 fn one(value: Vec3) -> [u8; 4] {
@@ -271,7 +271,7 @@ mod realtime {
         let (size, samples) = (48, 64);
         let mut loaded = renderer.load(&scene, &renderer.light_of(&scene), filtering);
         let agree = |what: &str, wanted: &RenderScene, loaded: &kinran_render::realtime::GpuScene| {
-            let got = renderer.film(loaded, &camera, &settings, (size, size), samples, &|_, _| {}).unwrap();
+            let got = renderer.film(loaded, &camera, &settings, (size, size), samples, &untold).unwrap();
             let settings = Settings {
                 width: size,
                 height: size,
@@ -282,7 +282,7 @@ mod realtime {
                 background,
                 ..Settings::default()
             };
-            let wanted = render(wanted, &camera, &settings, &|_, _| {}).unwrap();
+            let wanted = render(wanted, &camera, &settings, &untold).unwrap();
             let mut apart: Vec<f32> = got
                 .pixels
                 .iter()

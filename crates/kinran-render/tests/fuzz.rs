@@ -1,6 +1,7 @@
 //! Fuzz in the reference renderer, against the formulas and the furnace.
 
 use glam::{Vec3, vec3};
+use kinran_image::untold;
 use kinran_render::Error;
 use kinran_render::reference::{Background, RenderScene, Settings, look_at, render};
 use kinran_scene::{Environment, Fuzz, FuzzAttenuation, FuzzLayer, FuzzPhase, Scene};
@@ -32,7 +33,7 @@ fn seen_along(scene: &RenderScene, v: Vec3, samples: u32) -> Vec3 {
         background: Background::Color(Vec3::ZERO),
         ..Settings::default()
     };
-    let film = render(scene, &look_at(v * 3.0, Vec3::ZERO, up, 1e-4), &settings, &|_, _| {}).unwrap();
+    let film = render(scene, &look_at(v * 3.0, Vec3::ZERO, up, 1e-4), &settings, &untold).unwrap();
     film.pixels[0].into()
 }
 
@@ -141,7 +142,6 @@ fn a_layer_returns_what_quadrature_says_and_no_more_than_the_furnace_brings() {
 fn velvet_without_coefficients_is_an_error_that_names_the_material() {
     let layer = FuzzLayer { phase: FuzzPhase::Velvet, ..FuzzLayer::default() };
     let scene = lit(Some(Fuzz::Layer(layer)), None, Some(Vec3::Z));
-    let result =
-        render(&scene, &look_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 0.5), &Settings::default(), &|_, _| {});
+    let result = render(&scene, &look_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 0.5), &Settings::default(), &untold);
     assert!(matches!(&result, Err(Error::Scene(e)) if e.contains("material 0")), "{:?}", result.err());
 }

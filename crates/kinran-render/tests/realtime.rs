@@ -1,7 +1,7 @@
 //! The real-time renderer against closed forms and the reference renderer, in linear light.
 
 use glam::{Affine3A, Vec3, Vec4, vec2, vec3};
-use kinran_image::{Encoder, Encoding, Format, Level, Preset, Texture, Transfer, encode};
+use kinran_image::{Encoder, Encoding, Format, Level, Preset, Texture, Transfer, encode, untold};
 use kinran_render::Error;
 use kinran_render::realtime::{
     Channel, Gpu, GpuScene, MAX_LIGHTS, Realtime, Settings, ShaderSource, Target, left_out,
@@ -17,6 +17,8 @@ use std::f32::consts::PI;
 use std::sync::{Arc, LazyLock, Mutex};
 
 mod shapes;
+#[path = "../../stopping.rs"]
+mod stopping;
 use shapes::{directional, material, scene, sphere, square};
 
 /// One renderer for all tests, one test at a time: a software device has all cores to itself.
@@ -59,7 +61,7 @@ impl Shot {
         with_renderer(|renderer| {
             let loaded = renderer.load(scene, &renderer.light_of(scene), self.filtering);
             let size = (self.size, self.size);
-            renderer.film(&loaded, &self.camera, &self.settings, size, self.samples, &|_, _| {}).unwrap()
+            renderer.film(&loaded, &self.camera, &self.settings, size, self.samples, &untold).unwrap()
         })
     }
 
@@ -74,7 +76,7 @@ impl Shot {
             background: self.settings.background,
             ..reference::Settings::default()
         };
-        render(scene, &self.camera, &settings, &|_, _| {}).unwrap()
+        render(scene, &self.camera, &settings, &untold).unwrap()
     }
 
     /// Both pictures agree: their means within `mean`, pixels within `pixel` of the brightest, all but one in fifty of
@@ -556,13 +558,26 @@ fn passes_with_nothing_to_do_cost_nothing() {
 }
 
 #[test]
+fn a_stopped_picture_is_drawn_on() {
+    let scene = lit_square(Vec::new());
+    let shot = Shot::new(vec3(0.0, 0.0, 3.0), 0.6);
+    with_renderer(|renderer| {
+        let loaded = renderer.load(&scene, &renderer.light_of(&scene), TRILINEAR);
+        let is_cancelled = |error: &Error| matches!(error, Error::Cancelled(_));
+        stopping::assert_stops("film", 10, is_cancelled, |tick| {
+            renderer.film(&loaded, &shot.camera, &shot.settings, (16, 16), 10, tick)
+        });
+    });
+}
+
+#[test]
 fn sizes_and_samples_that_cannot_be_drawn_are_refused() {
     let scene = lit_square(Vec::new());
     let shot = Shot::new(vec3(0.0, 0.0, 3.0), 0.6);
     for (size, samples, name) in [((0, 8), 1, "width"), ((8, 1 << 20), 1, "height"), ((8, 8), 0, "samples")] {
         let error = with_renderer(|renderer| {
             let loaded = renderer.load(&scene, &renderer.light_of(&scene), TRILINEAR);
-            renderer.film(&loaded, &shot.camera, &shot.settings, size, samples, &|_, _| {}).unwrap_err()
+            renderer.film(&loaded, &shot.camera, &shot.settings, size, samples, &untold).unwrap_err()
         });
         assert!(
             matches!(error, Error::Setting { name: got, .. } if got == name),
@@ -677,7 +692,7 @@ fn a_scene_sees_the_shadows_or_the_exposure_of_another() {
             let fresh =
                 Realtime::new(renderer.gpu(), &ShaderSource::default(), wgpu::TextureFormat::Rgba8Unorm)
                     .unwrap();
-            let wanted = fresh.film(scene, &shot.camera, settings, size, 4, &|_, _| {}).unwrap();
+            let wanted = fresh.film(scene, &shot.camera, settings, size, 4, &untold).unwrap();
             let got = target.film(renderer.gpu()).unwrap();
             assert_eq!(got, wanted, "the film of scene {i}");
             let wanted = to_srgb8(&wanted.pixels, settings.exposure, settings.tonemap);

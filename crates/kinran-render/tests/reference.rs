@@ -1,6 +1,7 @@
 //! The reference renderer against closed forms, quadrature and itself.
 
 use glam::{Affine3A, DVec3, Mat3, Vec2, Vec3, Vec4, dvec3, vec2, vec3};
+use kinran_image::untold;
 use kinran_render::{
     Error,
     reference::{
@@ -13,6 +14,8 @@ use kinran_shading::{aniso_encode, aniso_from_alphas, m_n, multiscatter_compensa
 use std::{f64::consts::PI, sync::Arc};
 
 mod shapes;
+#[path = "../../stopping.rs"]
+mod stopping;
 use shapes::{directional, material, scene, sphere, square};
 
 fn prepare(scene: &Scene, environment: Option<Environment>) -> RenderScene {
@@ -30,7 +33,7 @@ fn settings(size: u32, samples_per_pixel: u32) -> Settings {
 }
 
 fn draw(scene: &RenderScene, camera: &Camera, settings: &Settings) -> Film {
-    render(scene, camera, settings, &|_, _| {}).unwrap()
+    render(scene, camera, settings, &untold).unwrap()
 }
 
 /// One ray from `eye` to the origin.
@@ -718,6 +721,19 @@ fn the_picture_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
+fn a_stopped_picture_is_rendered_on() {
+    let (scene, camera) = busy_scene();
+    let is_cancelled = |error: &Error| matches!(error, Error::Cancelled(_));
+    // Pixels of many samples ask more often.
+    for samples in [1, 130] {
+        let settings = Settings { width: 70, height: 37, ..settings(1, samples) };
+        stopping::assert_stops(&format!("{samples} samples"), 70 * 37, is_cancelled, |tick| {
+            render(&scene, &camera, &settings, tick)
+        });
+    }
+}
+
+#[test]
 fn later_samples_go_on_where_the_first_ended_and_seeds_have_independent_noise() {
     let (scene, camera) = busy_scene();
     let part = |first_sample, samples_per_pixel, seed| {
@@ -742,17 +758,6 @@ fn later_samples_go_on_where_the_first_ended_and_seeds_have_independent_noise() 
     let (one, half) = (correlation(&less(&a, &b), &less(&c, &d)), correlation(&less(&a, &b), &less(&a, &c)));
     assert!(one.abs() < 0.15, "noise of different seeds: wanted a correlation of 0, got {one}");
     assert!((half - 0.5).abs() < 0.15, "noise of one seed in two differences: wanted 0.5, got {half}");
-}
-
-#[test]
-fn progress_counts_every_tile_once() {
-    let (scene, camera) = busy_scene();
-    let seen = std::sync::Mutex::new(Vec::new());
-    let settings = Settings { width: 40, height: 17, ..settings(1, 1) };
-    render(&scene, &camera, &settings, &|done, total| seen.lock().unwrap().push((done, total))).unwrap();
-    let mut seen = seen.into_inner().unwrap();
-    seen.sort_unstable();
-    assert_eq!(seen, (1..=6).map(|i| (i, 6)).collect::<Vec<_>>());
 }
 
 #[test]
@@ -836,7 +841,7 @@ fn an_empty_scene_is_its_background() {
 fn settings_out_of_range_are_refused_by_name() {
     let empty = prepare(&Scene::default(), None);
     let good = look_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 0.5);
-    let refused = |camera: &Camera, settings: Settings| match render(&empty, camera, &settings, &|_, _| {}) {
+    let refused = |camera: &Camera, settings: Settings| match render(&empty, camera, &settings, &untold) {
         Err(Error::Setting { name, .. }) => name,
         other => panic!("{settings:?} is accepted: {:?}", other.map(|f| f.width)),
     };

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
+use kinran_image::Tick;
 use serde_json::{Map, Value, json};
 
 use crate::{Error, meshopt};
@@ -33,16 +34,19 @@ pub(crate) fn is_compressed<'a>(mut used: impl Iterator<Item = &'a str>) -> bool
     used.any(|name| name == DRACO || MESHOPT.contains(&name))
 }
 
-/// Replaces compressed geometry by buffer views of one more buffer, and takes the extensions out of the document.
+/// Replaces compressed geometry by buffer views of one more buffer, and takes the extensions out of the document. `tick` is
+/// told of no units.
 pub(crate) fn decompress<'a>(
     name: &'a Path,
     json: &mut Map<String, Value>,
     buffer: Buffers<'a>,
+    tick: &'a Tick<'a>,
 ) -> Result<Plain, Error> {
     let count = list(json, "buffers").len();
     let mut work = Work {
         name,
         buffer,
+        tick,
         added: count,
         compressed: 0,
         emptied: BTreeSet::new(),
@@ -69,6 +73,7 @@ pub(crate) fn decompress<'a>(
 struct Work<'a> {
     name: &'a Path,
     buffer: Buffers<'a>,
+    tick: &'a Tick<'a>,
     /// Index of the buffer that is added.
     added: usize,
     /// Compressed bytes that were read.
@@ -136,6 +141,7 @@ impl Work<'_> {
                 return Err(self.error(format!("{what}: is no object")));
             };
             let bytes = self.view(extension, &what)?;
+            (self.tick)(0)?;
             let (buffer, start, length) = self.place(extension, &what)?;
             self.plain.freed.push((buffer, start, length));
             self.compressed += length;
@@ -184,6 +190,7 @@ impl Work<'_> {
             for p in 0..count {
                 let primitive = &mut list_mut(json, "meshes")[m]["primitives"][p];
                 let Some(extension) = take_extension(primitive, DRACO) else { continue };
+                (self.tick)(0)?;
                 let primitive = primitive.clone();
                 let what = format!("mesh {m}, primitive {p}: {DRACO}");
                 self.primitive(json, &primitive, &extension, &views, &what)?;

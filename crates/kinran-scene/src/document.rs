@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 
-use kinran_image::write_atomically;
+use kinran_image::{untold, write_atomically};
 use percent_encoding::{AsciiSet, CONTROLS, percent_encode};
 use serde_json::{Map, Value, json};
 
@@ -210,7 +210,7 @@ impl Document {
             return Ok(false);
         }
         let mut json = self.json.clone();
-        let plain = decompress(&self.path, &mut json, &|buffer| self.buffer(buffer))?;
+        let plain = decompress(&self.path, &mut json, &|buffer| self.buffer(buffer), &untold)?;
         self.added_buffer = Some((array(&json, "buffers").len() - 1, plain.bytes));
         self.freed = plain.freed;
         self.json = json;

@@ -46,6 +46,9 @@ pub enum Error {
     /// An image could not be read; the message names it.
     #[error(transparent)]
     Image(#[from] kinran_image::Error),
+    /// A [`Tick`](kinran_image::Tick) stopped the work.
+    #[error(transparent)]
+    Cancelled(#[from] kinran_image::Cancelled),
 }
 
 impl Error {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, DVec4, Mat3, Quat, Vec2, Vec3, Vec4};
-use kinran_image::{Image, Pixels, Texture, Transfer};
+use kinran_image::{Cancelled, Image, Pixels, Texture, Tick, Transfer, untold};
 use rayon::prelude::*;
 use serde::Deserialize;
 
@@ -153,19 +153,20 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`], about what is needed.
     pub fn load_part(path: impl AsRef<Path>, allowed: &[PathBuf], needs: &Needs) -> Result<Scene, Error> {
-        Scene::load_watched(path, allowed, needs, &|_, _| {})
+        Scene::load_watched(path, allowed, needs, &|_| {}, &untold)
     }
 
-    /// As [`Scene::load_part`]; `watch` is told of how many units of work more there are than it has heard of, and how many
-    /// more are done. A unit is about what a triangle takes.
+    /// As [`Scene::load_part`]; `expect` is told of how many units of work there are, once that is known, and `tick` of those
+    /// that are done. A unit is about what a triangle takes.
     ///
     /// # Errors
-    /// As [`Scene::load_part`].
+    /// As [`Scene::load_part`], and [`Error::Cancelled`] where `tick` stops the work.
     pub fn load_watched(
         path: impl AsRef<Path>,
         allowed: &[PathBuf],
         needs: &Needs,
-        watch: &(dyn Fn(u64, u64) + Sync),
+        expect: &dyn Fn(u64),
+        tick: &Tick<'_>,
     ) -> Result<Scene, Error> {
         let path = path.as_ref();
         let mut bytes = read_regular_file(path).map_err(|error| Error::io(path, error))?;
@@ -174,7 +175,7 @@ impl Scene {
             without_materials = names_materials(&bytes);
             bytes = glb_from_obj(path, &bytes)?;
         }
-        let mut scene = Scene::read(path, &bytes, &beside(path, allowed), needs, watch)?;
+        let mut scene = Scene::read(path, &bytes, &beside(path, allowed), needs, expect, tick)?;
         if without_materials {
             let name = path.display();
             scene.warnings.push(format!(
@@ -190,7 +191,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn from_bytes(name: &Path, bytes: &[u8], resolve: &GivenResolver<'_>) -> Result<Scene, Error> {
-        Scene::read(name, bytes, &given(resolve), &Needs::ALL, &|_, _| {})
+        Scene::read(name, bytes, &given(resolve), &Needs::ALL, &|_| {}, &untold)
     }
 
     fn read(
@@ -198,7 +199,8 @@ impl Scene {
         bytes: &[u8],
         resolve: &Resolver<'_>,
         needs: &Needs,
-        watch: &(dyn Fn(u64, u64) + Sync),
+        expect: &dyn Fn(u64),
+        tick: &Tick<'_>,
     ) -> Result<Scene, Error> {
         let container = split(name, bytes)?;
         let no_gltf = |error: serde_json::Error| {
@@ -213,7 +215,7 @@ impl Scene {
                 let bytes = buffers.get(i).map(|bytes| Cow::Borrowed(bytes.as_slice()));
                 bytes.ok_or_else(|| Error::malformed(name, format!("buffer {i} does not exist")))
             };
-            let plain = decompress(name, &mut document, &buffer)?;
+            let plain = decompress(name, &mut document, &buffer, tick)?;
             buffers.push(plain.bytes);
             root = serde_json::from_value(document.into()).map_err(no_gltf)?;
         }
@@ -224,12 +226,12 @@ impl Scene {
             first_use: Vec::new(),
             worlds: Vec::new(),
             needs: *needs,
-            watch,
+            tick,
             scene: Scene { warnings: container.warnings, ..Scene::default() },
         };
         loader.first_use = loader.first_uses();
         loader.materials()?;
-        watch(loader.extent(), 0);
+        expect(loader.extent());
         if needs.geometry {
             let meshes = loader.meshes()?;
             loader.nodes(&meshes)?;
@@ -305,8 +307,8 @@ struct Loader<'a> {
     /// Of all nodes, once a skin has asked for them.
     worlds: Vec<Option<DAffine3>>,
     needs: Needs,
-    /// Told of units of work that are known of, and of those that are done.
-    watch: &'a (dyn Fn(u64, u64) + Sync),
+    /// Told of the units of [`Loader::extent`].
+    tick: &'a Tick<'a>,
     scene: Scene,
 }
 
@@ -778,7 +780,7 @@ impl Loader<'_> {
                     (primitive.source.mesh, primitive.source.primitive) = (m, p);
                     primitives.push(primitive);
                 }
-                (self.watch)(0, extent);
+                (self.tick)(extent)?;
             }
             for (skin, range) in poses {
                 let first = self.scene.primitives.len();
@@ -1316,21 +1318,21 @@ impl Loader<'_> {
                     return Ok(None);
                 }
                 let image = self.image(i, &texels, resolve)?;
-                (self.watch)(0, IMAGE);
+                (self.tick)(IMAGE)?;
                 Ok(Some(Arc::new(image)))
             })
             .collect();
         self.scene.images = images?;
-        let textures: Vec<_> = (runtime.into_par_iter().enumerate())
+        let textures = (runtime.into_par_iter().enumerate())
             .map(|(i, used)| {
                 if !used {
-                    return Ok(None);
+                    return Ok(Ok(None));
                 }
                 let texture = self.runtime_texture(i, resolve);
-                (self.watch)(0, IMAGE);
-                texture.map(Some)
+                (self.tick)(IMAGE)?;
+                Ok(texture.map(Some))
             })
-            .collect();
+            .collect::<Result<Vec<Result<_, Error>>, Cancelled>>()?;
         for (texture, drawn) in textures.into_iter().zip(drawn) {
             let texture = match texture {
                 Ok(texture) => texture.map(Arc::new),

@@ -1,9 +1,13 @@
 //! Small documents that probe one thing each.
 
+#[path = "../../stopping.rs"]
+mod stopping;
+
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{Vec2, Vec3, Vec4};
-use kinran_scene::{AlphaMode, Error, LightKind, Scene, Wrap};
+use kinran_scene::{AlphaMode, Error, LightKind, Needs, Scene, Wrap};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -105,6 +109,24 @@ fn load(bytes: &[u8]) -> Result<Scene, Error> {
 
 fn assert_near(what: &str, want: Vec3, got: Vec3) {
     assert!((want - got).length() < 1e-5, "{what}: wanted {want}, got {got}");
+}
+
+#[test]
+fn a_stopped_document_is_read_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (json, bin) = everything();
+    let plain = folder.path().join("everything.glb");
+    std::fs::write(&plain, glb(&json, &bin)).unwrap();
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    for path in [plain, data.join("draco_edgebreaker.glb"), data.join("meshopt_ext.glb")] {
+        let units = AtomicU64::new(0);
+        let expect = |more| _ = units.fetch_add(more, Ordering::Relaxed);
+        Scene::load_watched(&path, &[], &Needs::ALL, &expect, &kinran_image::untold).unwrap();
+        let is_cancelled = |error: &Error| matches!(error, Error::Cancelled(_));
+        stopping::assert_stops(&path.to_string_lossy(), units.into_inner(), is_cancelled, |tick| {
+            Scene::load_watched(&path, &[], &Needs::ALL, &|_| {}, tick)
+        });
+    }
 }
 
 #[test]
@@ -709,8 +731,7 @@ fn compressed_geometry_is_read_as_other_geometry() {
         let path = folder.path().join("noise.glb");
         std::fs::write(&path, empty).unwrap();
         assert!(Scene::load(&path).is_err(), "{name}: noise was geometry");
-        let needs =
-            kinran_scene::Needs { geometry: false, rest_pose: true, maps: kinran_scene::Maps::Surface };
+        let needs = Needs { geometry: false, rest_pose: true, maps: kinran_scene::Maps::Surface };
         assert!(Scene::load_part(&path, &[], &needs).is_ok(), "{name}: textures need geometry");
     }
 }

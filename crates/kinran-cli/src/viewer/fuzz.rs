@@ -83,7 +83,9 @@ impl FuzzParameters {
             2 => Fuzz::Simple { fuzziness: self.fuzziness, texture: None },
             _ => return None,
         };
+        // Nobody stops it.
         let fits = (self.kind == 1).then(|| fuzz_fits(phase, self.spread, &Progress::default()));
+        let fits = fits.and_then(Result::ok);
         let texture = |of: fn(&RenderFuzz) -> &Option<kinran_render::reference::BoundTexture>| {
             loaded.as_ref().and_then(|loaded| of(loaded).clone())
         };

@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 use std::time::Instant;
 
 use glam::Vec3;
-use kinran_image::write_atomically;
+use kinran_image::{Cancelled, write_atomically};
 use kinran_render::realtime::{GpuLight, GpuScene, Realtime, ShaderSource};
 use kinran_render::reference::{RenderScene, SurfaceTextures, Surroundings, TextureFiltering};
 use kinran_scene::Scene;
@@ -67,9 +67,9 @@ pub(super) type Baking = Option<(String, f32)>;
 /// What both threads and the window see.
 #[derive(Default)]
 struct Common {
-    /// The number of the model that is shown: bakes for another one are not begun.
+    /// The number of the model that is shown: bakes for another one are not begun, or stopped.
     model: AtomicU64,
-    /// The window is closing: the device is not touched any more.
+    /// The window is closing: the device is not touched any more, and what is being read or baked is stopped.
     closing: AtomicBool,
     baking: Mutex<Baking>,
 }
@@ -77,6 +77,22 @@ struct Common {
 impl Common {
     fn set_baking(&self, baking: Baking) {
         *self.baking.lock().expect("no thread panics") = baking;
+    }
+
+    /// Whether anybody waits for what is being done.
+    ///
+    /// # Errors
+    /// Where the window is closing.
+    fn wanted(&self) -> Result<(), Cancelled> {
+        if self.closing.load(Relaxed) { Err(Cancelled) } else { Ok(()) }
+    }
+
+    /// Whether anybody waits for a bake.
+    ///
+    /// # Errors
+    /// Where another model is shown, or the window is closing.
+    fn bake_wanted(&self, model: u64) -> Result<(), Cancelled> {
+        if self.model.load(Relaxed) == model { self.wanted() } else { Err(Cancelled) }
     }
 }
 
@@ -86,10 +102,28 @@ pub(super) struct Loader {
     events: Receiver<Event>,
     common: Arc<Common>,
     reader: Option<JoinHandle<()>>,
+    baker: Option<JoinHandle<()>>,
 }
 
 /// A model to be baked: its number, itself, and the method.
 type Bake = (u64, Arc<Scene>, Mips);
+
+/// Bakes for as long as somebody waits for it; `wake` is called when the window has a bar to show.
+fn bake(common: &Arc<Common>, (number, scene, mips): &Bake, wake: impl FnOnce()) -> Result<Surfaces, Error> {
+    common.bake_wanted(*number)?;
+    let name = format!("baking {}", mips.name());
+    common.set_baking(Some((name.clone(), 0.0)));
+    wake();
+    let (watching, number) = (common.clone(), *number);
+    let progress = Progress::watched(move |_, share| {
+        watching.bake_wanted(number)?;
+        watching.set_baking(Some((name.clone(), share)));
+        Ok(())
+    });
+    let baked = scene_surfaces(scene, *mips, &progress);
+    common.set_baking(None);
+    Ok(baked?.0)
+}
 
 impl Loader {
     /// Starts them. `wake` is called whenever there is something new.
@@ -103,20 +137,10 @@ impl Loader {
         let common = Arc::new(Common::default());
 
         let (results, shared, waker) = (jobs.clone(), common.clone(), wake.clone());
-        std::thread::spawn(move || {
-            while let Ok((number, scene, mips)) = to_bake.recv() {
-                if shared.model.load(Relaxed) != number {
-                    continue;
-                }
-                let name = format!("baking {}", mips.name());
-                shared.set_baking(Some((name.clone(), 0.0)));
-                waker();
-                let watching = shared.clone();
-                let progress =
-                    Progress::watched(move |_, share| watching.set_baking(Some((name.clone(), share))));
-                let surfaces = scene_surfaces(&scene, mips, &progress).map(|(surfaces, _)| surfaces);
-                shared.set_baking(None);
-                if results.send(Job::Baked(number, mips, surfaces)).is_err() {
+        let baker = std::thread::spawn(move || {
+            while let Ok(wanted) = to_bake.recv() {
+                let surfaces = bake(&shared, &wanted, &waker);
+                if results.send(Job::Baked(wanted.0, wanted.2, surfaces)).is_err() {
                     return;
                 }
             }
@@ -152,7 +176,7 @@ impl Loader {
                 }
             }
         });
-        Self { jobs: Some(jobs), events, common, reader: Some(reader) }
+        Self { jobs: Some(jobs), events, common, reader: Some(reader), baker: Some(baker) }
     }
 
     /// Asks for something.
@@ -173,15 +197,16 @@ impl Loader {
         self.common.baking.lock().expect("no thread panics").clone()
     }
 
-    /// Ends the thread that uses the device and waits for it. A bake, which does not use it, ends with the process.
+    /// Stops both threads and waits for them.
     pub(super) fn close(&mut self) {
         self.common.closing.store(true, Relaxed);
         // A job that does nothing, in case it waits for one.
         self.ask(Job::Bake(Mips::Level0));
         self.jobs = None;
-        if let Some(reader) = self.reader.take() {
+        // The baker waits for what the reader sends it.
+        for thread in [self.reader.take(), self.baker.take()].into_iter().flatten() {
             // It has said what went wrong.
-            let _ = reader.join();
+            let _ = thread.join();
         }
     }
 }
@@ -211,11 +236,12 @@ impl Work {
     fn run(&mut self, job: Job) -> Result<Vec<Event>, Error> {
         match job {
             Job::Open(path, args) => {
-                let Model { path, scene, only_baked } =
-                    Model::open(&path, &args.model, &Progress::new(false))?;
+                let common = self.common.clone();
+                let progress = Progress::watched(move |_, _| common.wanted());
+                let Model { path, scene, only_baked } = Model::open(&path, &args.model, &progress)?;
                 let view = View::new(&scene, &path.to_string_lossy(), &args)?;
                 let plain = vec![None; scene.materials.len()];
-                let prepared = view.scene(&scene, plain, &Progress::new(false))?;
+                let prepared = view.scene(&scene, plain, &progress)?;
                 let warnings = scene.warnings.iter().chain(view.environment_notes()).cloned().collect();
                 let opened = Opened {
                     name: path.to_string_lossy().into_owned(),
@@ -246,7 +272,7 @@ impl Work {
                     self.surfaces.insert(mips, surfaces);
                     return self.bring(mips);
                 }
-                // The baker ends only with the process.
+                // The baker ends after this thread.
                 let _ = self.bakes.send((self.common.model.load(Relaxed), scene.clone(), mips));
                 Ok(Vec::new())
             }
@@ -311,7 +337,46 @@ pub(super) fn middle(scene: &RenderScene) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
+    use glam::Mat3;
+    use kinran_bake::aniso::Filter;
+    use kinran_image::{Channels, Image, Pixels};
+    use kinran_scene::{Material, TextureRef, Wrap};
+
     use super::*;
+
+    /// Who shows another model, or closes the window, would wait for the processor.
+    #[test]
+    fn a_bake_goes_on_that_nobody_waits_for() {
+        let texels = (0..256 * 256).flat_map(|i| [i as u8, 128, 255]).collect();
+        let image = Image::new(256, 256, Channels::Rgb, Pixels::U8(texels)).unwrap();
+        let normal = TextureRef {
+            image: 0,
+            runtime: None,
+            uv_set: 0,
+            transform: Mat3::IDENTITY,
+            wrap: [Wrap::Repeat; 2],
+        };
+        let scene = Scene {
+            images: vec![Some(Arc::new(image))],
+            materials: vec![Material { normal: Some(normal), ..Material::default() }],
+            ..Scene::default()
+        };
+        let wanted = (0, Arc::new(scene), Mips::Filtered(Filter::Linear));
+        for closing in [false, true] {
+            let name = if closing { "the window closes" } else { "another model is shown" };
+            let stop = |common: &Common| {
+                common.model.fetch_add(u64::from(!closing), Relaxed);
+                common.closing.store(closing, Relaxed);
+            };
+            let common = Arc::new(Common::default());
+            assert!(bake(&common, &wanted, || {}).is_ok_and(|surfaces| surfaces[0].is_some()));
+            let stopped = bake(&common, &wanted, || stop(&common));
+            assert_eq!(stopped.map_err(|e| e.code()).err(), Some("cancelled"), "{name}");
+            assert!(common.baking.lock().unwrap().is_none(), "{name}: the bar stays");
+            let late = bake(&common, &wanted, || panic!("{name}: it is begun"));
+            assert_eq!(late.map_err(|e| e.code()).err(), Some("cancelled"), "{name}");
+        }
+    }
 
     #[test]
     fn filling_a_folder_keeps_what_was_edited() {

@@ -191,7 +191,7 @@ impl MeshPipelines {
                     };
                     pipeline(device, source, &pass)
                 };
-                Ok([pass(true)?, pass(false)?])
+                Ok::<_, Error>([pass(true)?, pass(false)?])
             };
         let multiplied = blended(wgpu::BlendFactor::Zero, wgpu::BlendFactor::Src);
         let [base, normal, factors] = G_BUFFER;

@@ -1,6 +1,7 @@
 //! The renderer.
 
 use glam::Vec3;
+use kinran_image::Tick;
 use kinran_scene::Camera;
 
 use super::Gpu;
@@ -159,12 +160,11 @@ impl Realtime {
         self.gpu.queue.submit([encoder.finish()]);
     }
 
-    /// A picture of `samples` frames, as the reference renderer returns it. `progress` is called with the frames done and
-    /// of all.
+    /// A picture of `samples` frames, as the reference renderer returns it. `tick` is told of each frame.
     ///
     /// # Errors
     /// [`Error::Setting`] for a size that the device does not draw or for no samples, [`Error::Gpu`] when the picture
-    /// cannot be read back.
+    /// cannot be read back, [`Error::Cancelled`] where `tick` stops the work.
     pub fn film(
         &self,
         scene: &GpuScene,
@@ -172,7 +172,7 @@ impl Realtime {
         settings: &Settings,
         size: (u32, u32),
         samples: u32,
-        progress: &dyn Fn(usize, usize),
+        tick: &Tick<'_>,
     ) -> Result<Film, Error> {
         let largest = self.gpu.device.limits().max_texture_dimension_2d;
         let refuse = |name, value: u32, fix| Err(Error::Setting { name, value: value.to_string(), fix });
@@ -196,7 +196,7 @@ impl Realtime {
                 let waited = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
                 waited.map_err(|e| Error::Gpu(format!("the device does not draw any more: {e}")))?;
             }
-            progress(frame as usize + 1, samples as usize);
+            tick(1)?;
         }
         target.film(&self.gpu)
     }

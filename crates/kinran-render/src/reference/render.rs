@@ -15,12 +15,12 @@ use super::{
 };
 use crate::Error;
 use glam::{Vec2, Vec3};
+use kinran_image::{Cancelled, Tick};
 use kinran_scene::{AlphaMode, Camera};
 use kinran_shading::fuzz::{fuzz_over_base_pdf, fuzz_over_base_sample};
 use kinran_shading::{ggx_vndf_pdf, ggx_vndf_sample, m_n};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What the camera sees where there is no surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +93,9 @@ const MAX_SIDE: u32 = 32768;
 /// Side of the squares of pixels that threads work on.
 const TILE: u32 = 16;
 
+/// Samples of a pixel above which each row of a tile asks whether to go on: a tile of them takes a tenth of a second and more.
+const LONG_PIXEL: u32 = 128;
+
 /// Surfaces one behind the other that a ray may see or pass; beyond it there is nothing. Blended foliage
 /// rarely stacks more than a dozen.
 const MAX_LAYERS: usize = 128;
@@ -104,16 +107,17 @@ const ENVIRONMENT: u32 = 2;
 const BACKDROP: u32 = 3;
 const PENUMBRA: u32 = 4;
 
-/// Renders `scene`. `progress` is called with the number of tiles done and of all, from any thread. The same
+/// Renders `scene`. `tick` is told of pixels, `width * height` in all. The same
 /// arguments give the same picture, bit by bit, whatever the number of threads.
 ///
 /// # Errors
-/// [`Error::Setting`] for a size, a number of samples or an angle outside its range.
+/// [`Error::Setting`] for a size, a number of samples or an angle outside its range, [`Error::Cancelled`] where `tick` stops
+/// the work.
 pub fn render(
     scene: &RenderScene,
     camera: &Camera,
     settings: &Settings,
-    progress: &(dyn Fn(usize, usize) + Sync),
+    tick: &Tick<'_>,
 ) -> Result<Film, Error> {
     check(camera, settings)?;
     check_fuzz(scene)?;
@@ -122,19 +126,22 @@ pub fn render(
     let renderer = Renderer { scene, settings, cutouts: scene.materials.iter().any(lets_light_through) };
 
     let columns = width.div_ceil(TILE);
-    let total = (columns * height.div_ceil(TILE)) as usize;
-    let done = AtomicUsize::new(0);
-    let tiles: Vec<Vec<Vec3>> = (0..total as u32)
+    let total = columns * height.div_ceil(TILE);
+    let tiles = (0..total)
         .into_par_iter()
         .map(|tile| {
             let (x0, y0) = (tile % columns * TILE, tile / columns * TILE);
-            let rows = y0..(y0 + TILE).min(height);
-            let pixels = rows.flat_map(|y| (x0..(x0 + TILE).min(width)).map(move |x| (x, y)));
-            let pixels = pixels.map(|(x, y)| renderer.pixel(&picture, x, y)).collect();
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
-            pixels
+            let mut pixels = Vec::new();
+            for y in y0..(y0 + TILE).min(height) {
+                if settings.samples_per_pixel > LONG_PIXEL {
+                    tick(0)?;
+                }
+                pixels.extend((x0..(x0 + TILE).min(width)).map(|x| renderer.pixel(&picture, x, y)));
+            }
+            tick(pixels.len() as u64)?;
+            Ok(pixels)
         })
-        .collect();
+        .collect::<Result<Vec<Vec<Vec3>>, Cancelled>>()?;
 
     let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
     for (tile, values) in tiles.iter().enumerate() {

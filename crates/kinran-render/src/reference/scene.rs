@@ -175,12 +175,22 @@ impl RenderScene {
     }
 
     /// Gives every layer of fibres the coefficients that `fit` makes for its phase and spread.
-    pub fn fit_fuzz(&mut self, fit: impl Fn(FuzzPhase, f32) -> Arc<FuzzFits>) {
-        for fuzz in self.materials.iter_mut().filter_map(|m| m.fuzz.as_mut()) {
-            if let Fuzz::Layer(layer) = &fuzz.fuzz {
-                fuzz.fits = Some(fit(layer.phase, layer.spread));
+    ///
+    /// # Errors
+    /// The first one of `fit`; no layer is changed then.
+    pub fn fit_fuzz<E>(&mut self, fit: impl Fn(FuzzPhase, f32) -> Result<Arc<FuzzFits>, E>) -> Result<(), E> {
+        let of_material = |material: &RenderMaterial| match &material.fuzz.as_ref()?.fuzz {
+            Fuzz::Layer(layer) => Some(fit(layer.phase, layer.spread)),
+            _ => None,
+        };
+        let fits = self.materials.iter().map(|material| of_material(material).transpose());
+        let fits = fits.collect::<Result<Vec<_>, E>>()?;
+        for (material, fits) in self.materials.iter_mut().zip(fits) {
+            if let (Some(fuzz), Some(fits)) = (&mut material.fuzz, fits) {
+                fuzz.fits = Some(fits);
             }
         }
+        Ok(())
     }
 }
 
