@@ -45,6 +45,7 @@ fn surface() -> SurfaceMaps {
         normal: NormalMap::new(image(normal), false),
         roughness: RoughnessMaps::Encoded(image(aniso)),
         wrap: [Wrap::Repeat; 2],
+        weights: None,
     }
 }
 

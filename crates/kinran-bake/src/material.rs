@@ -77,7 +77,10 @@ pub fn material_surface(scene: &Scene, material: usize) -> Result<MaterialSurfac
         None => RoughnessMaps::Isotropic(roughness),
     };
     let wrap = place.map_or([Wrap::Repeat; 2], |place| place.wrap);
-    Ok(MaterialSurface { maps: SurfaceMaps { normal, roughness, wrap }, place: place.cloned() })
+    Ok(MaterialSurface {
+        maps: SurfaceMaps { normal, roughness, wrap, weights: None },
+        place: place.cloned(),
+    })
 }
 
 fn apart(

@@ -26,7 +26,7 @@ mod tests {
     use super::*;
     use crate::aniso::{
         DirectionMap, Filter, Kernel, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps,
-        SurfaceOptions, bake_surface, ndf_error,
+        SurfaceOptions, Weights, bake_surface, ndf_error,
     };
     use crate::curvature::{Mesh, Method, Options, bake_curvature};
     use crate::detail::{Blend, DetailOptions, Layer, MapKind, Target, Tile, TileOptions, solve};
@@ -115,6 +115,7 @@ mod tests {
                 direction: Some(DirectionMap::Vector(Arc::new(noise(4)))),
             },
             wrap: [Wrap::Repeat, Wrap::Mirror],
+            weights: None,
         };
         let encoding = |format| Encoding { format, encoder: Encoder::Portable, preset: Preset::Fast };
         let request =
@@ -125,10 +126,12 @@ mod tests {
             request(Sheet::Roughness, Format::Rgba8, Some(&packed)),
             request(Sheet::KhrAnisotropy, Format::Rgba16F, None),
         ];
+        let weights = (0..SIZE.0 * SIZE.1).map(|i| u16::from(random(10, i)) << 8).collect();
+        let weighted = SurfaceMaps { weights: Weights::new(SIZE, weights).map(Arc::new), ..maps.clone() };
         for filter in Filter::ALL {
-            for kernel in [Kernel::Box, Kernel::Tent] {
+            for (kernel, maps) in [(Kernel::Box, &maps), (Kernel::Tent, &maps), (Kernel::Tent, &weighted)] {
                 let options = SurfaceOptions { filter, kernel };
-                let Ok(baked) = bake_surface(&maps, options, &requests, &untold) else {
+                let Ok(baked) = bake_surface(maps, options, &requests, &untold) else {
                     assert_eq!((filter, kernel), (Filter::Param, Kernel::Box), "only param has one kernel");
                     continue;
                 };

@@ -5,9 +5,10 @@ mod common;
 use std::sync::Arc;
 
 use common::Random;
+use glam::Vec3;
 use kinran_bake::aniso::{
-    DirectionMap, Filter, Kernel, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps,
-    SurfaceOptions, bake_surface,
+    ColorMap, Dielectric, DirectionMap, Filter, Kernel, NormalMap, Reflectance, ReflectanceMaps,
+    RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps, SurfaceOptions, bake_surface,
 };
 use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Texture, untold};
 use kinran_scene::Wrap;
@@ -25,6 +26,18 @@ fn maps(width: u32, height: u32) -> SurfaceMaps {
             u: ScalarMap::channel(noise(2, width, height), 0),
             v: ScalarMap::channel(noise(3, width, height), 1),
             direction: Some(DirectionMap::Vector(noise(4, width, height))),
+        },
+        wrap: [Wrap::Repeat; 2],
+        weights: None,
+    }
+}
+
+fn reflectance(width: u32, height: u32) -> Reflectance {
+    Reflectance {
+        maps: ReflectanceMaps::Metallic {
+            base: ColorMap { image: Some(noise(5, width, height)), factor: Vec3::ONE },
+            metallic: ScalarMap::channel(noise(6, width / 2, height / 2), 0),
+            dielectric: Dielectric::default(),
         },
         wrap: [Wrap::Repeat; 2],
     }
@@ -55,22 +68,23 @@ fn requests(encoder: Encoder, packed: &Image) -> [SheetRequest<'_>; 4] {
 fn bytes_depend_on_the_number_of_threads() {
     let packed = noise(9, 70, 50);
     for encoder in [Encoder::Portable, Encoder::Ispc] {
-        for filter in Filter::ALL {
+        for (filter, is_weighted) in Filter::ALL.into_iter().flat_map(|f| [(f, false), (f, true)]) {
             let kernel = if filter == Filter::Param { Kernel::Tent } else { Kernel::Box };
             let bake = |threads: usize| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let options = SurfaceOptions { filter, kernel };
-                pool.install(|| bake_surface(&maps(70, 50), options, &requests(encoder, &packed), &untold))
-                    .unwrap()
+                pool.install(|| {
+                    let weights = is_weighted.then(|| reflectance(70, 50).weights((70, 50))).flatten();
+                    let maps = SurfaceMaps { weights: weights.map(Arc::new), ..maps(70, 50) };
+                    bake_surface(&maps, options, &requests(encoder, &packed), &untold).unwrap()
+                })
             };
             let one = bake(1);
             for threads in [2, 3, 8] {
                 let many = bake(threads);
-                assert!(
-                    one.textures == many.textures,
-                    "{encoder:?} {filter:?}: {threads} threads, other bytes"
-                );
-                assert_eq!(one.levels, many.levels, "{encoder:?} {filter:?}: {threads} threads");
+                let what = format!("{encoder:?} {filter:?}, weighted {is_weighted}: {threads} threads");
+                assert!(one.textures == many.textures, "{what}, other bytes");
+                assert_eq!(one.levels, many.levels, "{what}");
             }
         }
     }
@@ -97,6 +111,7 @@ fn a_row_depends_on_rows_below_its_footprint() {
             direction: Some(DirectionMap::Vector(half(direction))),
         },
         wrap: all.wrap,
+        weights: None,
     };
     let packed = noise(9, 64, 128);
     let upper_packed = top(&packed, 64);

@@ -46,6 +46,7 @@ fn a_full_circle_of_directions_gains_a_seam() {
                 texture: Some(radial()),
             },
             wrap: [Wrap::Clamp; 2],
+            weights: None,
         };
         let encoding = Encoding { format: Format::Rgba8, encoder: Encoder::Portable, preset: Preset::Fast };
         let request = SheetRequest { sheet: Sheet::KhrAnisotropy, encoding, packed_with: None };

@@ -78,6 +78,7 @@ fn constant_maps_change_from_level_to_level() {
                         normal: NormalMap::new(plain(width, height, code), false),
                         roughness: roughness.clone(),
                         wrap: [wrap; 2],
+                        weights: None,
                     };
                     for filter in Filter::ALL {
                         let requests = sheets.map(|sheet| SheetRequest {
@@ -139,6 +140,7 @@ fn constants_alone_have_no_size() {
         normal: NormalMap::flat(),
         roughness: RoughnessMaps::Isotropic(ScalarMap::constant(0.5)),
         wrap: [Wrap::Repeat; 2],
+        weights: None,
     };
     for filter in Filter::ALL {
         let levels = levels_of(&maps, filter, Kernel::Box);
@@ -186,7 +188,7 @@ fn any_maps(seed: u64, width: u32, height: u32, kind: u32, wrap: Wrap) -> Surfac
         },
         _ => RoughnessMaps::Encoded(image()),
     };
-    SurfaceMaps { normal, roughness, wrap: [wrap, Wrap::Repeat] }
+    SurfaceMaps { normal, roughness, wrap: [wrap, Wrap::Repeat], weights: None }
 }
 
 /// All filters' levels hold unit normals with z >= 0 and roughness with eigenvalues in [0, 1].
@@ -252,6 +254,7 @@ fn odd_footprints_are_probed_beyond_their_end() {
             normal: NormalMap::new(plain(width, 2, [128, 128, 255]), false),
             roughness: RoughnessMaps::Isotropic(ScalarMap::constant(0.3)),
             wrap: [Wrap::Repeat; 2],
+            weights: None,
         };
         let request = SheetRequest {
             sheet: Sheet::Normal,

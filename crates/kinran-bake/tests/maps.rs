@@ -97,7 +97,7 @@ fn close(case: &str, texel: usize, got: Surface, n: V3, a: [f64; 3]) {
 }
 
 fn level_0(normal: NormalMap, roughness: RoughnessMaps, wrap: Wrap) -> Vec<Surface> {
-    let maps = SurfaceMaps { normal, roughness, wrap: [wrap; 2] };
+    let maps = SurfaceMaps { normal, roughness, wrap: [wrap; 2], weights: None };
     levels_of(&maps, Filter::Naive, Kernel::Box).swap_remove(0)
 }
 
@@ -187,6 +187,7 @@ fn blue_is_ignored_or_scaled() {
             normal: NormalMap::gltf(map, 1.0),
             roughness: RoughnessMaps::Isotropic(ScalarMap::constant(0.5)),
             wrap: [Wrap::Repeat; 2],
+            weights: None,
         };
         let got = levels_of(&maps, Filter::Naive, Kernel::Box)[0][0];
         close("one texel", 0, got, wanted, [0.0625, 0.0, 0.0625]);

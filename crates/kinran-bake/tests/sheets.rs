@@ -129,6 +129,7 @@ fn packed_channels_are_lost() {
             normal: NormalMap::new(noise(5, width, height, Channels::Rgb), false),
             roughness: RoughnessMaps::Isotropic(ScalarMap::channel(orm.clone(), 1)),
             wrap: [Wrap::Repeat; 2],
+            weights: None,
         };
         for sheet in [Sheet::Roughness, Sheet::IsotropicRoughness] {
             for format in [Format::Rgba8, Format::Rgba16F] {

@@ -54,6 +54,7 @@ fn a_stopped_surface_is_baked_on() {
         normal: NormalMap::new(noise(1), false),
         roughness: RoughnessMaps::Isotropic(ScalarMap::channel(noise(2), 0)),
         wrap: [Wrap::Repeat; 2],
+        weights: None,
     };
     let packed = noise(3);
     let request = |sheet, packed_with| SheetRequest { sheet, encoding: RGBA8, packed_with };

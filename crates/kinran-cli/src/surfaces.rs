@@ -246,7 +246,7 @@ fn separate_surface(
     };
     let bound = |sheet, place: Option<&TextureRef>, normal, roughness| -> Result<BoundTexture, Error> {
         let wrap = place.map_or([kinran_scene::Wrap::Repeat; 2], |place| place.wrap);
-        let maps = SurfaceMaps { normal, roughness, wrap };
+        let maps = SurfaceMaps { normal, roughness, wrap, weights: None };
         let [texture] = textures(&maps, [sheet], mips, &m.name, progress)?;
         Ok(bind(texture, place))
     };

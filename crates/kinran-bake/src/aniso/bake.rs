@@ -15,8 +15,9 @@ use serde::Serialize;
 use super::footprint::{Kernel, Taps, footprints};
 use super::levels::{Band, Filter, filter_levels};
 use super::maps::{DirectionMap, RoughnessMaps, SurfaceMaps, TexelSpan};
-use super::ndf_error::ndf_error;
+use super::ndf_error::weighted_ndf_error;
 use super::sheet::{Sheet, decode_aniso, decode_khr};
+use super::weights;
 use crate::mips::{BAND_ROWS, Rgba8Level, plain_levels, unorm8};
 use crate::simd::dispatch;
 
@@ -150,8 +151,8 @@ pub fn bake_surface(
             .map(|probe| {
                 let (columns, rows) =
                     (&columns[level - 1][probe.x as usize], &rows[level - 1][probe.y as usize]);
-                let texels = footprint_texels(maps, columns, rows);
-                f64::from(ndf_error(&texels, (probe.n, probe.a)).powi(2))
+                let (texels, weights) = footprint_texels(maps, columns, rows);
+                f64::from(weighted_ndf_error(&texels, &weights, (probe.n, probe.a)).powi(2))
             })
             .collect();
         for (texture, data) in textures.iter_mut().zip(data) {
@@ -381,21 +382,27 @@ fn probes(band: &Band, size: (u32, u32)) -> Vec<Probe> {
         .collect()
 }
 
-/// Up to 8 × 8 texels of level 0 spread over a footprint.
-fn footprint_texels(maps: &SurfaceMaps, columns: &Taps, rows: &Taps) -> Vec<(Vec3, Sym2)> {
+/// Up to 8 × 8 texels of level 0 spread over a footprint, and their weights, whose mean is one.
+fn footprint_texels(maps: &SurfaceMaps, columns: &Taps, rows: &Taps) -> (Vec<(Vec3, Sym2)>, Vec<f32>) {
     let some = |taps: &Taps| -> Vec<u32> {
         let count = taps.len().min(8);
         // Every other one is drawn from one texel earlier: even steps would meet one phase of a weave only.
         let shift = |i| usize::from(taps.len() >= 16 && i % 2 == 1);
         (0..count).map(|i| taps[(2 * i + 1) * taps.len() / (2 * count) - shift(i)].0).collect()
     };
-    let mut texels = Vec::new();
+    let (mut texels, mut shares) = (Vec::new(), Vec::new());
     let mut span = TexelSpan::default();
     for row in some(rows) {
         for column in some(columns) {
             maps.decode_span(maps.size(), row, column, 1, &mut span);
             texels.push((vec3(span.nx[0], span.ny[0], span.nz[0]), span.texel(0).1));
+            let weights = maps.weights.as_ref().map(|weights| weights.row(row, column, 1));
+            shares.push(weights.map_or(1.0, |weights| weights::share(weights[0])));
         }
     }
-    texels
+    if maps.weights.is_some() {
+        let mean = shares.iter().sum::<f32>() / shares.len() as f32;
+        shares.iter_mut().for_each(|share| *share /= mean);
+    }
+    (texels, shares)
 }

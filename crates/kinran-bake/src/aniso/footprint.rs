@@ -64,6 +64,21 @@ pub fn reduction(size: u32, level: usize, kernel: Kernel, wrap: Wrap) -> Vec<Tap
         .collect()
 }
 
+/// Taps that average an axis of `fine` texels to one of `coarse`, no more than these, by the area that texels cover.
+pub(crate) fn area_taps(fine: u32, coarse: u32) -> Vec<Taps> {
+    let ratio = f64::from(fine) / f64::from(coarse);
+    (0..coarse)
+        .map(|x| {
+            let (begin, end) = (f64::from(x) * ratio, f64::from(x + 1) * ratio);
+            let last = (end.ceil() as u32).min(fine);
+            (begin.floor() as u32..last)
+                .map(|i| (i, (((f64::from(i) + 1.0).min(end) - f64::from(i).max(begin)) / ratio) as f32))
+                .filter(|tap| tap.1 > 0.0)
+                .collect()
+        })
+        .collect()
+}
+
 /// Taps in order, with weights that add up to one.
 fn is_average(taps: &Taps) -> bool {
     let sum: f32 = taps.iter().map(|tap| tap.1).sum();

@@ -11,6 +11,7 @@ use kinran_shading::Sym2;
 use super::footprint::{Kernel, Taps, footprints};
 use super::maps::{SurfaceMaps, TexelSpan, clamp_roughness};
 use super::moments::{LeanFilter, LinearFilter, MOMENTS, MomentFilter, NaiveFilter};
+use super::weights::{self, Weights};
 use super::{dpd, ml, param};
 use crate::mips::{BAND_ROWS, PlaneBand, PlaneRows, TILE, reduce_levels};
 use crate::simd::dispatch;
@@ -81,10 +82,13 @@ impl Band {
 
 /// Filters `maps` to a full mip chain and hands every band of every level to `consume`, in parallel; returns
 /// what it returned, in order, per level. Level 0 is passed as authored. The result does not depend on the
-/// number of threads.
+/// number of threads. `naive` takes no weights: no mip generator does.
 ///
 /// # Errors
 /// The first one that `consume` gives; no band is begun after it.
+///
+/// # Panics
+/// When the maps' weights are not of the size of level 0.
 pub fn filter_levels<T: Send, E: Send>(
     maps: &SurfaceMaps,
     filter: Filter,
@@ -105,15 +109,25 @@ pub fn filter_levels<T: Send, E: Send>(
 ///
 /// # Errors
 /// As [`filter_levels`].
+///
+/// # Panics
+/// When the maps' weights are not of the size of level 0.
 pub fn coarser_levels<T: Send, E: Send>(
     maps: &SurfaceMaps,
     filter: Filter,
     kernel: Kernel,
     consume: impl Fn(&Band) -> Result<T, E> + Sync,
 ) -> Result<Vec<Vec<T>>, E> {
+    let weights = maps.checked_weights();
     match filter {
-        Filter::Linear => moment_levels::<LinearFilter, T, E>(maps, kernel, &consume),
-        Filter::Lean => moment_levels::<LeanFilter, T, E>(maps, kernel, &consume),
+        Filter::Linear => match weights {
+            Some(weights) => weighted_levels::<LinearFilter, T, E>(maps, weights, kernel, &consume),
+            None => moment_levels::<LinearFilter, T, E>(maps, kernel, &consume),
+        },
+        Filter::Lean => match weights {
+            Some(weights) => weighted_levels::<LeanFilter, T, E>(maps, weights, kernel, &consume),
+            None => moment_levels::<LeanFilter, T, E>(maps, kernel, &consume),
+        },
         Filter::Naive => moment_levels::<NaiveFilter, T, E>(maps, kernel, &consume),
         Filter::Dpd => footprint_levels(maps, kernel, dpd::fit_band, &consume),
         Filter::Ml => footprint_levels(maps, kernel, ml::fit_band, &consume),
@@ -186,20 +200,72 @@ fn moment_levels<F: MomentFilter, T: Send, E: Send>(
 ) -> Result<Vec<Vec<T>>, E> {
     let source = MomentRows::<F> { maps, size: maps.size(), filter: PhantomData };
     reduce_levels(&source, source.size, kernel, maps.wrap, |planes, texels: &mut TexelSpan| {
-        texels.clear();
-        dispatch(ExtractBand::<F> { planes: &planes, texels, filter: PhantomData });
-        let band = Band {
-            level: planes.level,
-            width: planes.width as u32,
-            y0: planes.y0 as u32,
-            rows: planes.rows as u32,
-            texels: std::mem::take(texels),
-        };
-        debug_assert!(band.is_sound(), "level {}, rows from {}", band.level, band.y0);
-        let made = consume(&band);
-        *texels = band.texels;
-        made
+        consume_averages::<F, T, E>(&planes, texels, consume)
     })
+}
+
+/// Hands a band of averages on as texels.
+fn consume_averages<F: MomentFilter, T: Send, E: Send>(
+    planes: &PlaneBand,
+    texels: &mut TexelSpan,
+    consume: &(impl Fn(&Band) -> Result<T, E> + Sync),
+) -> Result<T, E> {
+    texels.clear();
+    dispatch(ExtractBand::<F> { planes, texels, filter: PhantomData });
+    let band = Band {
+        level: planes.level,
+        width: planes.width as u32,
+        y0: planes.y0 as u32,
+        rows: planes.rows as u32,
+        texels: std::mem::take(texels),
+    };
+    debug_assert!(band.is_sound(), "level {}, rows from {}", band.level, band.y0);
+    let made = consume(&band);
+    *texels = band.texels;
+    made
+}
+
+/// Level 0 as the averages of a filter, each times the texel's weight, and the weight.
+struct WeightedRows<'a, F> {
+    maps: &'a SurfaceMaps,
+    weights: &'a Weights,
+    filter: PhantomData<F>,
+}
+
+impl<F: MomentFilter> PlaneRows for WeightedRows<'_, F> {
+    const PLANES: usize = MOMENTS + 1;
+    type Scratch = TexelSpan;
+
+    #[inline(always)]
+    fn sum_rows(&self, rows: &Taps, x0: usize, len: usize, span: &mut TexelSpan, sums: &mut [[f32; TILE]]) {
+        sums.fill([0.0; TILE]);
+        for &(y, weight) in rows {
+            self.maps.decode_span(self.weights.size(), y, x0 as u32, len, span);
+            add_weighted::<F>(span, self.weights.row(y, x0 as u32, len), weight, sums);
+        }
+    }
+}
+
+/// Levels by averages in which texels count by their weight.
+fn weighted_levels<F: MomentFilter, T: Send, E: Send>(
+    maps: &SurfaceMaps,
+    weights: &Weights,
+    kernel: Kernel,
+    consume: &(impl Fn(&Band) -> Result<T, E> + Sync),
+) -> Result<Vec<Vec<T>>, E> {
+    let source = WeightedRows::<F> { maps, weights, filter: PhantomData };
+    let consume = |planes: PlaneBand, (samples, texels): &mut (Vec<f32>, TexelSpan)| {
+        let width = planes.width;
+        samples.clear();
+        for row in planes.samples.chunks_exact(width * (MOMENTS + 1)) {
+            let (moments, weights) = row.split_at(width * MOMENTS);
+            for plane in moments.chunks_exact(width) {
+                samples.extend(plane.iter().zip(weights).map(|(moment, weight)| moment / weight));
+            }
+        }
+        consume_averages::<F, T, E>(&PlaneBand { samples, ..planes }, texels, consume)
+    };
+    reduce_levels(&source, weights.size(), kernel, maps.wrap, consume)
 }
 
 /// Turns the averages of a band into its texels.
@@ -265,6 +331,26 @@ fn add_moments<F: MomentFilter>(span: &TexelSpan, weight: f32, sums: &mut [[f32;
         for (sums, m) in sums.iter_mut().zip(moments::<F>(&span, i)) {
             sums[i] += m * weight;
         }
+    }
+}
+
+/// Adds the moments of a decoded span, times the weight of texel and row, and these weights to the sums of their columns.
+#[inline(always)]
+fn add_weighted<F: MomentFilter>(
+    span: &TexelSpan,
+    texel_weights: &[u16],
+    row_weight: f32,
+    sums: &mut [[f32; TILE]],
+) {
+    let Ok(sums): Result<&mut [[f32; TILE]; MOMENTS + 1], _> = sums.try_into() else { return };
+    let len = span.len().min(TILE);
+    let (span, texel_weights) = (planes(span, len), &texel_weights[..len]);
+    for i in 0..len {
+        let weight = row_weight * weights::share(texel_weights[i]);
+        for (sums, m) in sums.iter_mut().zip(moments::<F>(&span, i)) {
+            sums[i] += m * weight;
+        }
+        sums[MOMENTS][i] += weight;
     }
 }
 

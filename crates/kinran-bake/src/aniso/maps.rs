@@ -11,6 +11,7 @@ use kinran_shading::{
     aniso_from_alphas, axis_from_direction, normal_from_xy,
 };
 
+use super::weights::Weights;
 use crate::channels::{Place, read_channel, read_channels};
 use crate::simd::dispatch;
 
@@ -133,6 +134,9 @@ pub struct SurfaceMaps {
     pub roughness: RoughnessMaps,
     /// What lies beyond the borders along u and v, where a filter reaches there.
     pub wrap: [Wrap; 2],
+    /// How much each texel of level 0 counts in a footprint, of the size of level 0; all the same where there are none. What a
+    /// texel reflects, see [`Reflectance::weights`](super::Reflectance::weights), is what a filter of highlights should know.
+    pub weights: Option<Arc<Weights>>,
 }
 
 /// Texels of part of a row of level 0, one array a component.
@@ -225,6 +229,16 @@ impl SurfaceMaps {
             RoughnessMaps::Encoded(image) => [Some(image), None, None],
         };
         normal.into_iter().chain(roughness.into_iter().flatten()).collect()
+    }
+
+    /// The weights, where texels do not all count the same.
+    ///
+    /// # Panics
+    /// When they are not of the size of level 0.
+    pub(crate) fn checked_weights(&self) -> Option<&Weights> {
+        let weights = self.weights.as_deref()?;
+        assert_eq!(weights.size(), self.size(), "weights are of the size of level 0");
+        Some(weights)
     }
 
     /// Decodes the texels `x0 .. x0 + len` of row `y` of level 0, of size `size`, into `span`. Maps smaller
@@ -424,7 +438,7 @@ impl pulp::WithSimd for DecodeSpan<'_> {
 }
 
 #[inline(always)]
-fn read_scalar(map: &ScalarMap, at: Place, out: &mut [f32]) {
+pub(crate) fn read_scalar(map: &ScalarMap, at: Place, out: &mut [f32]) {
     match &map.image {
         None => out.fill(map.factor.clamp(0.0, 1.0)),
         Some((image, channel)) => {
@@ -484,6 +498,7 @@ mod tests {
                 normal: NormalMap::new(image(size), false),
                 roughness: RoughnessMaps::Isotropic(ScalarMap::channel(image(own), 1)),
                 wrap: [Wrap::Repeat, Wrap::Clamp],
+                weights: None,
             };
             let decode = |x0: usize, len: usize| {
                 let mut texels = TexelSpan::default();

@@ -3,7 +3,7 @@
 //! Each texel gives up to 16 microfacets: the four radii of [`UNIT_SLOPES`](kinran_shading::UNIT_SLOPES), each on
 //! opposite pairs of directions that are turned from texel to texel ([`turn`]), mapped by the texel's normal and
 //! roughness. Seen in the frame of the footprint's linear result n0, microfacet h has slope `s = h.xy/h.z` and weight
-//! `W = h.z`: its area as the mesh sees it. A filter finds the lobe's mean slope and squared roughness among them,
+//! `W = h.z`: its area as the mesh sees it, times the weight of its texel where texels differ in that. A filter finds the lobe's mean slope and squared roughness among them,
 //! starting at the linear result. What it found counts as far as it is smooth ([`towards_linear`]).
 //!
 //! Every level is fitted to microfacets of level 0. Footprints of more than 25 texels use fewer microfacets a texel, and
@@ -22,6 +22,7 @@ use super::footprint::Taps;
 use super::lanes::{F8, LANES, V8};
 use super::maps::{SurfaceMaps, TexelSpan};
 use super::moments::{sggx_normals, sggx_roughness};
+use super::weights;
 use crate::simd::dispatch;
 
 /// Texels of a footprint looked at: all, or 32 × 32 of a larger one, or as many of a longer and narrower one. Each axis is
@@ -98,6 +99,7 @@ impl<F: Fit> pulp::WithSimd for FitBand<'_, F> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { maps, columns, rows, out, .. } = self;
         let width = columns.len();
+        let weighted = maps.checked_weights().is_some();
         let mut block = Block { most: most_texels(longest(columns), longest(rows)), ..Block::default() };
         let mut microfacets = Vec::new();
         let mut x0 = 0;
@@ -109,7 +111,7 @@ impl<F: Fit> pulp::WithSimd for FitBand<'_, F> {
                 block.decode(maps, columns, rows);
                 for (group, columns) in columns.chunks(LANES).enumerate() {
                     let at = y * width + x0 + group * LANES;
-                    fit_group::<F>(&block, group, columns.len(), &mut microfacets, at, out);
+                    fit_group::<F>(&block, group, columns.len(), weighted, &mut microfacets, at, out);
                 }
             }
             x0 = end;
@@ -214,6 +216,9 @@ impl Block {
                 }
             }
             self.gather(j, row_weight);
+            if let Some(weights) = &maps.weights {
+                self.weigh(j, weights.row(row, first, len));
+            }
         }
     }
 
@@ -230,6 +235,18 @@ impl Block {
                     column - self.columns.0
                 }));
                 self.weights.push(weights);
+            }
+        }
+    }
+
+    /// Weighs the samples of row `j` by the weights of its texels.
+    #[inline(always)]
+    fn weigh(&mut self, j: usize, of: &[u16]) {
+        let (taps, rows) = (self.taps, self.rows.len());
+        let groups = self.samples.chunks_exact_mut(rows * taps).zip(self.picked.chunks_exact(taps));
+        for (samples, picked) in groups {
+            for (sample, picked) in samples[j * taps..(j + 1) * taps].iter_mut().zip(picked) {
+                sample.weight = sample.weight * F8(picked.map(|column| weights::share(of[column as usize])));
             }
         }
     }
@@ -361,12 +378,16 @@ fn fit_group<F: Fit>(
     block: &Block,
     group: usize,
     count: usize,
+    weighted: bool,
     microfacets: &mut Vec<Microfacet>,
     at: usize,
     out: &mut TexelSpan,
 ) {
     let samples = block.group(group);
-    let linear = linear_sums(samples);
+    let mut linear = linear_sums(samples);
+    if weighted {
+        linear.normalise(samples);
+    }
     let (frame, start) = linear_frames(&linear);
     match microfacets_per_texel(samples.len()) {
         16 => scatter::<16>(samples, block.taps, &frame, microfacets),
@@ -447,6 +468,20 @@ struct Linear {
     mean: V8,
     /// Zero in lanes whose footprint is the same texel everywhere: it comes out as it went in.
     varies: [u32; LANES],
+}
+
+impl Linear {
+    /// Makes averages of sums whose weights do not add up to one.
+    #[inline(always)]
+    fn normalise(&mut self, samples: &[Sample]) {
+        let mut total = F8::default();
+        for sample in samples {
+            total += sample.weight;
+        }
+        let inv = total.recip();
+        self.sums = self.sums.map(|sum| sum * inv);
+        self.mean = self.mean * inv;
+    }
 }
 
 #[inline(always)]
@@ -651,6 +686,7 @@ mod tests {
                 normal: NormalMap::new(noise(), false),
                 roughness: RoughnessMaps::Isotropic(ScalarMap::channel(noise(), 0)),
                 wrap: [Wrap::Repeat; 2],
+                weights: None,
             };
             let of = |side| footprints(side, level + 1, Kernel::Box, Wrap::Repeat).swap_remove(level - 1);
             let (columns, rows) = (of(size.0), of(size.1));

@@ -13,6 +13,7 @@
 //!     normal: NormalMap::new(normal, false),
 //!     roughness: RoughnessMaps::Isotropic(ScalarMap { image: None, factor: 0.3 }),
 //!     wrap: [Wrap::Repeat; 2],
+//!     weights: None,
 //! };
 //! let encoding = Encoding { format: Format::Rgba8, encoder: Encoder::Portable, preset: Preset::Fast };
 //! let aniso = SheetRequest { sheet: Sheet::Aniso, encoding, packed_with: None };
@@ -34,7 +35,9 @@ mod ml;
 mod moments;
 mod ndf_error;
 mod param;
+mod reflectance;
 mod sheet;
+mod weights;
 
 pub use bake::{BakedSurface, LevelError, SheetRequest, SurfaceOptions, bake_surface};
 pub use footprint::{Kernel, Taps, footprints, reduction};
@@ -42,4 +45,6 @@ pub use levels::{Band, Filter, coarser_levels, filter_levels};
 pub use maps::{DirectionMap, NormalMap, NormalZ, RoughnessMaps, ScalarMap, SurfaceMaps, TexelSpan};
 pub use microfacets::MAX_TEXELS;
 pub use ndf_error::ndf_error;
+pub use reflectance::{ColorMap, Dielectric, Reflectance, ReflectanceMaps};
 pub use sheet::{Sheet, decode_aniso, decode_khr};
+pub use weights::Weights;

@@ -18,11 +18,17 @@ use crate::simd::dispatch;
 /// mixes of two roughnesses), which give too few samples of their tails. Zero for an exact fit, about one for a lobe that has
 /// nothing to do with the footprint.
 pub fn ndf_error(texels: &[(Vec3, Sym2)], fit: (Vec3, Sym2)) -> f32 {
-    dispatch(NdfError { texels, fit })
+    weighted_ndf_error(texels, &vec![1.0; texels.len()], fit)
+}
+
+/// [`ndf_error`] against the weighted mean; the weights' mean is one.
+pub(crate) fn weighted_ndf_error(texels: &[(Vec3, Sym2)], weights: &[f32], fit: (Vec3, Sym2)) -> f32 {
+    dispatch(NdfError { texels, weights, fit })
 }
 
 struct NdfError<'a> {
     texels: &'a [(Vec3, Sym2)],
+    weights: &'a [f32],
     fit: (Vec3, Sym2),
 }
 
@@ -65,18 +71,18 @@ impl pulp::WithSimd for NdfError<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> f32 {
-        let Self { texels, fit } = self;
+        let Self { texels, weights, fit } = self;
         // A determinant of zero is a lobe without width: the smallest roughness that is shaded.
         let floor = |a: Sym2| a + Sym2::scalar(1e-7);
         let share = 1.0 / texels.len() as f32;
         let mut lobes = vec![Lobes::default(); texels.len().div_ceil(LANES)];
-        for (i, &(n, a)) in texels.iter().enumerate() {
-            lobes[i / LANES].set(i % LANES, n, floor(a), share);
+        for (i, (&(n, a), weight)) in texels.iter().zip(weights).enumerate() {
+            lobes[i / LANES].set(i % LANES, n, floor(a), share * weight);
         }
         let fitted = sggx_from_ggx(fit.0, floor(fit.1));
 
         let (mut error, mut norm) = (0.0_f64, 0.0_f64);
-        let mut add = |h: Vec3| {
+        let mut add = |h: Vec3, weight: f32| {
             let h = h.normalize();
             if h.z <= 0.0 {
                 return;
@@ -91,17 +97,17 @@ impl pulp::WithSimd for NdfError<'_> {
             let density = 0.5 * (mean + lobe);
             if density > 0.0 {
                 let difference = lobe - mean;
-                error += f64::from(difference * difference / density);
-                norm += f64::from(mean * mean / density);
+                error += f64::from(difference * difference / density * weight);
+                norm += f64::from(mean * mean / density * weight);
             }
         };
-        for &(n, a) in texels {
+        for (&(n, a), weight) in texels.iter().zip(weights) {
             let [x, y, z] = microfacet_basis(n, floor(a));
-            UNIT_SLOPES.iter().for_each(|s| add(x * s.x + y * s.y + z));
+            UNIT_SLOPES.iter().for_each(|s| add(x * s.x + y * s.y + z, *weight));
         }
         let [x, y, z] = microfacet_basis(fit.0, floor(fit.1));
         for _ in texels {
-            UNIT_SLOPES.iter().for_each(|s| add(x * s.x + y * s.y + z));
+            UNIT_SLOPES.iter().for_each(|s| add(x * s.x + y * s.y + z, 1.0));
         }
         if norm > 0.0 { (error / norm).sqrt() as f32 } else { 0.0 }
     }

@@ -14,6 +14,7 @@ use kinran_shading::{
 
 use super::footprint::Taps;
 use super::maps::{SurfaceMaps, TexelSpan};
+use super::weights;
 
 /// Fits some rows of a level: `columns` are the footprints of their texels along x, `rows` those along y.
 pub(crate) fn fit_band(maps: &SurfaceMaps, columns: &[Taps], rows: &[Taps], out: &mut TexelSpan) {
@@ -32,7 +33,14 @@ fn fit_row(maps: &SurfaceMaps, columns: &[Taps], rows: &Taps, at: usize, out: &m
         sum.covariance = sum.covariance + normal_covariance(n, a) * weight;
         let first = *sum.first.get_or_insert((n, a));
         sum.varies |= first != (n, a);
+        sum.weight += weight;
     });
+    // Weights of taps add up to one.
+    let is_weighted = maps.weights.is_some();
+    for sum in sums.iter_mut().filter(|_| is_weighted) {
+        sum.mean /= sum.weight;
+        sum.covariance = sum.covariance * sum.weight.recip();
+    }
 
     let axes: Vec<Mat3> =
         sums.iter().map(|s| principal_axes(s.covariance, s.mean.normalize_or(Vec3::Z))).collect();
@@ -47,7 +55,8 @@ fn fit_row(maps: &SurfaceMaps, columns: &[Taps], rows: &Taps, at: usize, out: &m
         let (n, a) = match sum.first {
             Some(texel) if !sum.varies => texel,
             _ => {
-                let squared = areas[x] * areas[x];
+                let area = if is_weighted { areas[x] / sum.weight } else { areas[x] };
+                let squared = area * area;
                 let diagonal = Sym3 { xx: squared.x, yy: squared.y, zz: squared.z, ..Sym3::default() };
                 ggx_from_sggx(diagonal.in_frame(axes[x].transpose()), sum.mean.normalize_or(Vec3::Z))
             }
@@ -64,6 +73,7 @@ struct Sums {
     /// The first texel: a constant footprint comes out as it went in.
     first: Option<(Vec3, Sym2)>,
     varies: bool,
+    weight: f32,
 }
 
 /// Calls `visit(x, n, a, weight)` for every texel of the footprint of every `x` of a row, row by row of level 0.
@@ -77,10 +87,12 @@ fn for_each_texel(
     let mut span = TexelSpan::default();
     for &(row, row_weight) in rows {
         maps.decode_span(size, row, 0, size.0 as usize, &mut span);
+        let weights = maps.weights.as_ref().map(|weights| weights.row(row, 0, size.0 as usize));
         for (x, taps) in columns.iter().enumerate() {
             for &(column, weight) in taps {
                 let (n, a) = span.texel(column as usize);
-                visit(x, n, a, weight * row_weight);
+                let own = weights.map_or(1.0, |weights| weights::share(weights[column as usize]));
+                visit(x, n, a, weight * row_weight * own);
             }
         }
     }

@@ -99,7 +99,7 @@ impl MaterialMaps {
                     None => NormalMap::flat(),
                 };
                 let roughness = roughness_maps(source, &images, self.wrap)?;
-                Some(SurfaceMaps { normal, roughness, wrap: self.wrap })
+                Some(SurfaceMaps { normal, roughness, wrap: self.wrap, weights: None })
             }
         };
         Ok(LoadedMaterial { name: self.name.clone(), surface, images: loaded, occlusion, metallic, notes })

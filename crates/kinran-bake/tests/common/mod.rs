@@ -64,7 +64,7 @@ pub fn maps_of(texels: &[Surface], width: u32, wrap: Wrap) -> SurfaceMaps {
         ..NormalMap::flat()
     };
     let aniso = image(texels.iter().flat_map(|t| aniso_encode(t.1).to_array()).collect());
-    SurfaceMaps { normal, roughness: RoughnessMaps::Encoded(aniso), wrap: [wrap; 2] }
+    SurfaceMaps { normal, roughness: RoughnessMaps::Encoded(aniso), wrap: [wrap; 2], weights: None }
 }
 
 /// All texels of all levels.

@@ -515,6 +515,7 @@ fn aniso_map(maps: &[MapFile]) -> Result<Option<MapFile>, Error> {
         normal: NormalMap::new(Arc::new(normal.image.clone()), normal.y_down),
         roughness: RoughnessMaps::Isotropic(ScalarMap::channel(Arc::new(roughness.image.clone()), 0)),
         wrap: [Wrap::Repeat; 2],
+        weights: None,
     };
     let request =
         SheetRequest { sheet: Sheet::Aniso, encoding: BlockFormat::Rgba8.encoding(), packed_with: None };
