@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | [`folder`], [`manifest`] | an understanding of what artists wrote |
 //! | [`aniso`] | mips of normals and roughness that keep the highlight's shape |
+//! | [`metal`] | mips of base colour and metalness that keep what is scattered and what is reflected |
 //! | [`detail`] | maps that tiled layers turn into an authored target |
 //! | [`curvature`], [`skin_lut`] | curvature of meshes and tables, for skin |
 //! | [`fuzz_fit`] | coefficients of fibres |
@@ -32,6 +33,7 @@ pub mod folder;
 pub mod fuzz_fit;
 pub mod manifest;
 mod material;
+pub mod metal;
 mod mips;
 mod patterns;
 mod pieces;
@@ -41,4 +43,4 @@ pub mod stamps;
 
 pub use kinran_image::srgb::{linear_from_srgb, srgb_from_linear};
 pub use material::{MaterialSurface, NoSurface, material_surface};
-pub use mips::{BAND_ROWS, Rgba8Level, bake_plain, pack_channels, plain_levels};
+pub use mips::{BAND_ROWS, Rgba8Level, bake_plain, compress_levels, pack_channels, plain_levels};

@@ -331,6 +331,7 @@ impl PlaneRows for ImagePlanes<'_> {
 }
 
 /// One level of 8-bit RGBA texels.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rgba8Level {
     /// Texels in a row.
     pub width: u32,
@@ -356,16 +357,7 @@ pub fn plain_levels(
     tick: &Tick<'_>,
 ) -> Result<Vec<Rgba8Level>, Cancelled> {
     let source = ImagePlanes { image, transfer, size, wrap };
-    let width = size.0 as usize;
-    let mut finest = vec![0; width * size.1 as usize * 4];
-    finest.par_chunks_mut(BAND_ROWS as usize * width * 4).enumerate().try_for_each(|(i, band)| {
-        let mut planes = vec![0.0; width * 4];
-        for (row, y) in band.chunks_exact_mut(width * 4).zip(i as u32 * BAND_ROWS..) {
-            source.row(y, 0, planes.chunks_exact_mut(width));
-            quantise_row(&planes, transfer, row);
-        }
-        tick(band.len() as u64 / 4)
-    })?;
+    let finest = finest(&source, tick)?;
     let bands = reduce_levels(&source, size, kernel, wrap, |band, (): &mut ()| {
         let mut bytes = vec![0; band.width * band.rows * 4];
         for (row, out) in
@@ -383,6 +375,35 @@ pub fn plain_levels(
         rgba8,
     });
     Ok(levels.collect())
+}
+
+/// Level 0 of [`plain_levels`].
+///
+/// # Errors
+/// Where `tick` stops it.
+pub(crate) fn finest_level(
+    image: &Image,
+    size: (u32, u32),
+    transfer: Transfer,
+    wrap: [Wrap; 2],
+    tick: &Tick<'_>,
+) -> Result<Rgba8Level, Cancelled> {
+    let rgba8 = finest(&ImagePlanes { image, transfer, size, wrap }, tick)?;
+    Ok(Rgba8Level { width: size.0, height: size.1, rgba8 })
+}
+
+fn finest(source: &ImagePlanes, tick: &Tick<'_>) -> Result<Vec<u8>, Cancelled> {
+    let width = source.size.0 as usize;
+    let mut finest = vec![0; width * source.size.1 as usize * 4];
+    finest.par_chunks_mut(BAND_ROWS as usize * width * 4).enumerate().try_for_each(|(i, band)| {
+        let mut planes = vec![0.0; width * 4];
+        for (row, y) in band.chunks_exact_mut(width * 4).zip(i as u32 * BAND_ROWS..) {
+            source.row(y, 0, planes.chunks_exact_mut(width));
+            quantise_row(&planes, source.transfer, row);
+        }
+        tick(band.len() as u64 / 4)
+    })?;
+    Ok(finest)
 }
 
 /// One 8-bit image out of channels of others, enlarged to `size` bilinearly where they are smaller; `otherwise`
@@ -422,8 +443,22 @@ pub fn bake_plain(
     wrap: [Wrap; 2],
     tick: &Tick<'_>,
 ) -> Result<Texture, Error> {
-    let levels = plain_levels(image, (image.width, image.height), transfer, kernel, wrap, &|_| tick(0))?
-        .into_iter()
+    let levels = plain_levels(image, (image.width, image.height), transfer, kernel, wrap, &|_| tick(0))?;
+    compress_levels(&levels, transfer, encoding, tick)
+}
+
+/// Levels as a compressed texture; `tick` as for [`bake_plain`].
+///
+/// # Errors
+/// [`Error::Unsupported`] where the encoder refuses, [`Error::Cancelled`] where `tick` says so.
+pub fn compress_levels(
+    levels: &[Rgba8Level],
+    transfer: Transfer,
+    encoding: Encoding,
+    tick: &Tick<'_>,
+) -> Result<Texture, Error> {
+    let levels = levels
+        .iter()
         .map(|level| {
             let row = 4 * level.width as usize;
             let bands = level.rgba8.par_chunks(BAND_ROWS as usize * row).map(|band| {

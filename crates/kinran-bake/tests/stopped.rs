@@ -8,15 +8,17 @@ mod stopping;
 use std::sync::Arc;
 
 use common::Random;
+use glam::Vec3;
 use kinran_bake::aniso::{
-    Filter, Kernel, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps, SurfaceOptions,
-    bake_surface,
+    ColorMap, Dielectric, Filter, Kernel, NormalMap, Reflectance, ReflectanceMaps, RoughnessMaps, ScalarMap,
+    Sheet, SheetRequest, SurfaceMaps, SurfaceOptions, bake_surface,
 };
 use kinran_bake::curvature::{CurvatureError, Mesh, Method, Options, bake_curvature, estimated_normals};
 use kinran_bake::detail::{
     DetailOptions, FADE_TRIALS, Layer, MapKind, Target, Tile, TileOptions, bearable_opacity, compare,
     lowest_resolution, solve,
 };
+use kinran_bake::metal::{Apart, base_and_metal};
 use kinran_bake::skin_lut::{INTERPOLATION_GRID, Profile, punctual_interpolation_error, punctual_table};
 use kinran_bake::{bake_plain, plain_levels};
 use kinran_image::{
@@ -106,6 +108,22 @@ fn a_stopped_detail_map_is_solved_on() {
     // Noise over other noise is not borne, and no halving of it: every opacity is tried.
     let faded = FADE_TRIALS * (all - of_level(2));
     assert_stops("opacity", faded, of_image, |tick| bearable_opacity(&target, &layers, &options, tick));
+}
+
+#[test]
+fn a_stopped_pair_of_colour_and_metalness_is_chosen_on() {
+    let reflectance = Reflectance {
+        maps: ReflectanceMaps::Metallic {
+            base: ColorMap { image: Some(noise(4)), factor: Vec3::ONE },
+            metallic: ScalarMap::channel(noise(5), 0),
+            dielectric: Dielectric::default(),
+        },
+        wrap: [Wrap::Repeat; 2],
+    };
+    let of_pair = |error: &Apart| matches!(error, Apart::Cancelled(_));
+    assert_stops("pairs", texels(SIZE), of_pair, |tick| {
+        base_and_metal(&reflectance, SIZE, Kernel::Box, tick)
+    });
 }
 
 #[test]

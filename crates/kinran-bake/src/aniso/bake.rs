@@ -86,20 +86,47 @@ pub fn bake_surface(
     requests: &[SheetRequest],
     tick: &Tick<'_>,
 ) -> Result<BakedSurface, Error> {
+    bake_surface_and_metal(maps, options, requests, &[], tick)
+}
+
+/// [`bake_surface`], with levels of metalness for blue of the packed maps, each of as many bytes as texels, such as
+/// [`base_and_metal`](crate::metal::base_and_metal) makes. Levels that are not there are averaged as they are.
+///
+/// # Errors
+/// As those of [`bake_surface`].
+///
+/// # Panics
+/// When a level has not as many bytes as texels.
+pub fn bake_surface_and_metal(
+    maps: &SurfaceMaps,
+    options: SurfaceOptions,
+    requests: &[SheetRequest],
+    metallic: &[Vec<u8>],
+    tick: &Tick<'_>,
+) -> Result<BakedSurface, Error> {
     let size = maps.size();
     let authored = authored_directions(maps);
     let beside: Vec<Option<Vec<Rgba8Level>>> = requests
         .iter()
-        .map(|request| {
+        .map(|request| -> Result<_, Error> {
             let image = match request.sheet {
                 Sheet::KhrAnisotropy => authored.as_ref().map(|authored| authored.image),
                 _ => request.packed_with,
             };
-            let levels =
-                |image| plain_levels(image, size, Transfer::Linear, options.kernel, maps.wrap, &|_| tick(0));
-            image.map(levels).transpose()
+            let Some(image) = image else { return Ok(None) };
+            let mut levels =
+                plain_levels(image, size, Transfer::Linear, options.kernel, maps.wrap, &|_| tick(0))?;
+            if request.sheet != Sheet::KhrAnisotropy {
+                for (level, metallic) in levels.iter_mut().zip(metallic) {
+                    assert_eq!(level.rgba8.len(), 4 * metallic.len(), "a byte of metalness for each texel");
+                    for (texel, metallic) in level.rgba8.chunks_exact_mut(4).zip(metallic) {
+                        texel[2] = *metallic;
+                    }
+                }
+            }
+            Ok(Some(levels))
         })
-        .collect::<Result<_, _>>()?;
+        .collect::<Result<_, Error>>()?;
     let turn = authored.map_or(Vec2::X, |authored| authored.turn);
 
     // Compress, band by band.

@@ -29,17 +29,19 @@ mod dpd;
 mod footprint;
 pub(crate) mod lanes;
 mod levels;
-mod maps;
+pub(crate) mod maps;
 mod microfacets;
 mod ml;
 mod moments;
 mod ndf_error;
 mod param;
-mod reflectance;
+pub(crate) mod reflectance;
 mod sheet;
 mod weights;
 
-pub use bake::{BakedSurface, LevelError, SheetRequest, SurfaceOptions, bake_surface};
+pub use bake::{
+    BakedSurface, LevelError, SheetRequest, SurfaceOptions, bake_surface, bake_surface_and_metal,
+};
 pub use footprint::{Kernel, Taps, footprints, reduction};
 pub use levels::{Band, Filter, coarser_levels, filter_levels};
 pub use maps::{DirectionMap, NormalMap, NormalZ, RoughnessMaps, ScalarMap, SurfaceMaps, TexelSpan};

@@ -1,6 +1,7 @@
 //! Surfaces to filter, and the truth to hold filters against.
 #![allow(dead_code, unreachable_pub, missing_docs, reason = "a module of tests, each of which uses its part")]
 
+pub mod colored;
 pub mod exact;
 
 use std::convert::Infallible;
