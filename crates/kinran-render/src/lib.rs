@@ -29,7 +29,7 @@
 //! let (min, max) = scene.geometry.bounds().expect("there are triangles");
 //! let camera = frame_box(min, max, vec3(0.0, 0.0, 1.0), 0.6, 1.0);
 //! let settings = Settings { width: 8, height: 8, ..Settings::default() };
-//! let film = render(&scene, &camera, &settings, &|_, _| {})?;
+//! let film = render(&scene, &camera, &settings, &kinran_image::untold)?;
 //! let picture = to_srgb8(&film.pixels, 0.0, Tonemap::None);
 //! assert_eq!(picture[0], [255; 3], "the sky");
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -14,7 +14,7 @@
 //! let loaded = renderer.load(scene, &renderer.light_of(scene), filtering);
 //! let (min, max) = scene.geometry.bounds().expect("there are triangles");
 //! let camera = frame_box(min, max, glam::Vec3::Z, 0.6, 1.0);
-//! let film = renderer.film(&loaded, &camera, &Settings::default(), (512, 512), 16, &|_, _| {})?;
+//! let film = renderer.film(&loaded, &camera, &Settings::default(), (512, 512), 16, &kinran_image::untold)?;
 //! # Ok(())
 //! # }
 //! ```
