@@ -16,11 +16,10 @@ mod twins;
 
 use std::collections::BTreeMap;
 use std::f32::consts::TAU;
-use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use kinran_image::{IMAGE_EXTENSIONS, Transfer, has_image_extension};
+use kinran_image::{Disk, Entry, Files, IMAGE_EXTENSIONS, Transfer, has_image_extension};
 use kinran_scene::Wrap;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -387,9 +386,17 @@ impl Found {
 /// [`FolderError`]: the folder cannot be read or has no maps, a flag makes no sense, or maps can be read in
 /// more than one way.
 pub fn scan(folder: &Path, hints: &Hints) -> Result<Folder, FolderError> {
+    scan_in(&Disk, folder, hints)
+}
+
+/// As [`scan`], of a folder that may be elsewhere than on a disk.
+///
+/// # Errors
+/// As [`scan`].
+pub fn scan_in(files: &dyn Files, folder: &Path, hints: &Hints) -> Result<Folder, FolderError> {
     check_flags(hints)?;
-    let Listing { mut found, others, folders } = list(folder)?;
-    apply_flags(folder, hints, &mut found)?;
+    let Listing { mut found, others, folders } = list(files, folder)?;
+    apply_flags(files, folder, hints, &mut found)?;
     judge_letters(&mut found);
     sets::share(&mut found);
 
@@ -405,17 +412,17 @@ pub fn scan(folder: &Path, hints: &Hints) -> Result<Folder, FolderError> {
     }
 
     let mut result = Folder { rows: Vec::new(), materials: Vec::new() };
-    for mut files in groups.into_values() {
-        let name = match files[0].name.stem.as_str() {
-            "" => folder_name(folder),
+    for mut group in groups.into_values() {
+        let name = match group[0].name.stem.as_str() {
+            "" => folder_name(files, folder),
             stem => stem.to_owned(),
         };
-        let mut material = understand(&name, &mut files, hints)?;
+        let mut material = understand(&name, &mut group, hints)?;
         let constants = material.as_ref().map(|material| constant_rows(material, hints)).unwrap_or_default();
         if let Some(material) = material.as_mut() {
-            material.warnings = assumptions(material, &files, hints, &strangers);
+            material.warnings = assumptions(material, &group, hints, &strangers);
         }
-        result.rows.extend(files.into_iter().map(|file| row_of(&name, file)));
+        result.rows.extend(group.into_iter().map(|file| row_of(&name, file)));
         result.rows.extend(constants);
         result.materials.extend(material);
     }
@@ -546,10 +553,10 @@ impl Listing {
 }
 
 /// What is in a folder, and in the [`inner_folder`] where there is one.
-fn list(folder: &Path) -> Result<Listing, FolderError> {
-    let mut listing = list_one(folder, "")?;
-    if let Some(inner) = inner_folder_of(folder, &listing) {
-        let more = list_one(&inner, &format!("{}/", file_name(&inner)))?;
+fn list(files: &dyn Files, folder: &Path) -> Result<Listing, FolderError> {
+    let mut listing = list_one(files, folder, "")?;
+    if let Some(inner) = inner_folder_of(files, folder, &listing) {
+        let more = list_one(files, &inner, &format!("{}/", file_name(&inner)))?;
         listing.found.extend(more.found);
         listing.others.extend(more.others);
     }
@@ -559,10 +566,10 @@ fn list(folder: &Path) -> Result<Listing, FolderError> {
 /// The folder in a folder that has its maps, as archives do: the only one called textures or maps, where the folder itself
 /// has neither maps nor a glTF file.
 pub fn inner_folder(folder: &Path) -> Option<PathBuf> {
-    inner_folder_of(folder, &list_one(folder, "").ok()?)
+    inner_folder_of(&Disk, folder, &list_one(&Disk, folder, "").ok()?)
 }
 
-fn inner_folder_of(folder: &Path, listing: &Listing) -> Option<PathBuf> {
+fn inner_folder_of(files: &dyn Files, folder: &Path, listing: &Listing) -> Option<PathBuf> {
     let is_model = |file: &String| kinran_scene::is_gltf(Path::new(file));
     if listing.has_maps() || listing.others.iter().any(is_model) {
         return None;
@@ -571,26 +578,25 @@ fn inner_folder_of(folder: &Path, listing: &Listing) -> Option<PathBuf> {
     let mut inner = listing.folders.iter().filter(is_inner);
     let (Some(name), None) = (inner.next(), inner.next()) else { return None };
     let inner = folder.join(name);
-    list_one(&inner, "").is_ok_and(|listing| listing.has_maps()).then_some(inner)
+    list_one(files, &inner, "").is_ok_and(|listing| listing.has_maps()).then_some(inner)
 }
 
 /// What is in one folder; files are called by their names behind `prefix`.
-fn list_one(folder: &Path, prefix: &str) -> Result<Listing, FolderError> {
+fn list_one(files: &dyn Files, folder: &Path, prefix: &str) -> Result<Listing, FolderError> {
     let io = |e| FolderError::Image(kinran_image::Error::io(folder, e));
-    let entries = match fs::read_dir(folder) {
+    let entries = match files.list(folder) {
         Err(e) if e.kind() == ErrorKind::NotADirectory => {
             return Err(FolderError::NotAFolder(folder.into()));
         }
         other => other.map_err(io)?,
     };
     let mut listing = Listing { found: Vec::new(), others: Vec::new(), folders: Vec::new() };
-    for entry in entries {
-        let path = entry.map_err(io)?.path();
+    for Entry { path, is_folder } in entries {
         let file = file_name(&path);
         if file.starts_with('.') {
             continue;
         }
-        if path.is_dir() {
+        if is_folder {
             listing.folders.push(file);
         } else if has_image_extension(&path) || is_one_of(&path, &PICTURES) {
             listing.found.push(Found { file: format!("{prefix}{file}"), ..found_file(path) });
@@ -631,7 +637,7 @@ fn leave_out_baked(listing: &mut Listing) {
 /// # Errors
 /// [`FolderError::NotAFolder`], or the folder cannot be read.
 pub fn named_maps(folder: &Path) -> Result<Vec<(PathBuf, Role, Option<Green>)>, FolderError> {
-    let found = list(folder)?.found.into_iter().filter(|file| !file.unread);
+    let found = list(&Disk, folder)?.found.into_iter().filter(|file| !file.unread);
     Ok(found.filter_map(|file| Some((file.path, file.role?, file.name.green))).collect())
 }
 
@@ -667,8 +673,8 @@ fn file_name(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-fn folder_name(folder: &Path) -> String {
-    let absolute = || fs::canonicalize(folder).ok();
+fn folder_name(files: &dyn Files, folder: &Path) -> String {
+    let absolute = || files.canonical(folder).ok();
     let name = match folder.file_name() {
         Some(name) => Some(name.to_os_string()),
         None => absolute().and_then(|path| path.file_name().map(|n| n.to_os_string())),
@@ -677,7 +683,12 @@ fn folder_name(folder: &Path) -> String {
 }
 
 /// Gives files the roles that `--map` says, and takes out those that `--ignore` names.
-fn apply_flags(folder: &Path, hints: &Hints, found: &mut Vec<Found>) -> Result<(), FolderError> {
+fn apply_flags(
+    files: &dyn Files,
+    folder: &Path,
+    hints: &Hints,
+    found: &mut Vec<Found>,
+) -> Result<(), FolderError> {
     let position = |found: &[Found], path: &Path| {
         let named = found.iter().position(|f| f.path == path || f.path == folder.join(path));
         // Wherever it lies below the folder, where its name is the only one.
@@ -696,7 +707,7 @@ fn apply_flags(folder: &Path, hints: &Hints, found: &mut Vec<Found>) -> Result<(
         let flag = || format!("--map {role}={}", path.display());
         let at = match position(found, path) {
             Some(at) => at,
-            None if path.is_file() => {
+            None if files.is_file(path) => {
                 found.push(found_file(path.clone()));
                 found.len() - 1
             }

@@ -10,31 +10,22 @@ mod settings;
 
 use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
-use kinran_bake::aniso::{Filter, Kernel, Sheet, SurfaceOptions};
+use kinran::bake::{FolderOptions, GltfOptions};
+use kinran::options::{Container, Form, TextureOptions};
+use kinran_bake::aniso::{Filter, Kernel};
 use kinran_bake::folder::{FolderError, Green, Hints, Role as MapRole};
-use kinran_image::{
-    Encoder, Encoding, Format, Preset, Role, Texture, Transfer, encode_dds, encode_ktx2, full_level_count,
-    level_size, write_atomically,
-};
+use kinran_image::{Encoder, Format, Preset, Transfer};
 use kinran_scene::{Wrap, is_gltf};
 
 use self::flags::{Flag, On};
-use crate::content::Content;
 use crate::init::{MANIFEST, Survey};
 use crate::model::ModelArgs;
-use crate::outputs::{Space, beside, check_folder, has_extension};
-use crate::values::{exr_layer, filter, number};
+use crate::outputs::{beside, check_folder, has_extension, way};
+use crate::values::{CONTAINERS, Choices, FORMATS, PRESETS, choice, exr_layer, filter, number};
 use crate::{Console, Error};
 
-pub use curvature::{CurvatureArgs, CurvatureReport};
-use curvature::{MethodName, Which};
-pub use folder::bake_folder;
-pub use gltf::bake_gltf;
-pub(crate) use gltf::texel_remarks;
+pub use curvature::CurvatureArgs;
 pub use library::{CACHE_LIMIT, LibraryArgs, LibraryReport, bake_library, cache_folder};
-pub(crate) use report::format_name;
-pub use report::{Input, Output, Report, SurfaceReport};
 
 /// Bakes a folder of authored maps, a glTF file or a whole library into textures with right mips
 ///
@@ -74,19 +65,19 @@ pub struct Args {
     pub filter: Filter,
 
     /// Shape of the footprint
-    #[arg(long, value_enum, default_value_t)]
-    pub kernel: KernelName,
+    #[arg(long, default_value = "box", value_parser = choice(KERNELS))]
+    pub kernel: Kernel,
 
     /// What lies beyond the borders of a folder's maps; glTF files say it themselves
-    #[arg(long, value_enum, default_value_t)]
-    pub edges: Edges,
+    #[arg(long, default_value = "wrap", value_parser = choice(EDGES))]
+    pub edges: Wrap,
 
     /// Which maps hold the lobe; the default is aniso for folders and khr for glTF, which khr's maps are always written for
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choice(FORMS))]
     pub form: Option<Form>,
 
     /// File format of the textures
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, default_value = "ktx2", value_parser = choice(CONTAINERS))]
     pub container: Container,
 
     /// Zstandard level of KTX2 files, 0 for none
@@ -94,24 +85,24 @@ pub struct Args {
     pub zstd: i32,
 
     /// Format of normal maps [default: bc5]
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    pub normal_format: Option<FormatName>,
+    #[arg(long, value_name = "FORMAT", value_parser = choice(FORMATS))]
+    pub normal_format: Option<Format>,
 
     /// Format of aniso, anisotropy, roughness and orm maps [default: bc7]
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    pub aniso_format: Option<FormatName>,
+    #[arg(long, value_name = "FORMAT", value_parser = choice(FORMATS))]
+    pub aniso_format: Option<Format>,
 
     /// Format of colour maps [default: bc7]
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    pub color_format: Option<FormatName>,
+    #[arg(long, value_name = "FORMAT", value_parser = choice(FORMATS))]
+    pub color_format: Option<Format>,
 
     /// Who compresses blocks; portable gives the same bytes on every processor
-    #[arg(long, value_enum)]
-    pub encoder: Option<EncoderName>,
+    #[arg(long, value_parser = choice(ENCODERS))]
+    pub encoder: Option<Encoder>,
 
     /// Time spent on a block; the defaults are measured for each kind of map
-    #[arg(long, value_enum)]
-    pub preset: Option<PresetName>,
+    #[arg(long, value_parser = choice(PRESETS))]
+    pub preset: Option<Preset>,
 
     /// Of a glTF file, bake base colour, emission and occlusion too
     #[arg(long)]
@@ -165,8 +156,8 @@ pub struct Args {
     pub normal_blue: bool,
 
     /// How colour maps are encoded, whatever their files say; by default EXR, HDR and float TIFF are linear, others sRGB
-    #[arg(long, value_enum, value_name = "SPACE")]
-    pub color_space: Option<ColorSpace>,
+    #[arg(long, value_name = "SPACE", value_parser = choice(COLOR_SPACES))]
+    pub color_space: Option<Transfer>,
 
     /// Which layer of an EXR file holds the map; may be given again
     #[arg(long, value_name = "FILE=LAYER", value_parser = exr_layer)]
@@ -199,121 +190,34 @@ fn map(text: &str) -> Result<(MapRole, PathBuf), String> {
 }
 
 /// How colour is encoded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ColorSpace {
-    /// In proportion to light
-    Linear,
-    /// By the sRGB curve
-    Srgb,
-}
+const COLOR_SPACES: &Choices<Transfer> =
+    &[(Transfer::Linear, "linear", "In proportion to light"), (Transfer::Srgb, "srgb", "By the sRGB curve")];
 
 /// Shape of a footprint.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum KernelName {
-    /// The texel's own area
-    #[default]
-    Box,
-    /// Twice as wide, smoother over distance
-    Tent,
-}
+const KERNELS: &Choices<Kernel> = &[
+    (Kernel::Box, "box", "The texel's own area"),
+    (Kernel::Tent, "tent", "Twice as wide, smoother over distance"),
+];
 
 /// What lies beyond a map's border.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Edges {
-    /// The map again
-    #[default]
-    Wrap,
-    /// Its last texel
-    Clamp,
-    /// The map mirrored
-    Mirror,
-}
+const EDGES: &Choices<Wrap> = &[
+    (Wrap::Repeat, "wrap", "The map again"),
+    (Wrap::Clamp, "clamp", "Its last texel"),
+    (Wrap::Mirror, "mirror", "The map mirrored"),
+];
 
 /// Which maps hold the lobe.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Form {
-    /// Kinran's aniso map
-    Aniso,
-    /// Roughness and `KHR_materials_anisotropy`
-    Khr,
-    /// Both
-    Both,
-}
+const FORMS: &Choices<Form> = &[
+    (Form::Aniso, "aniso", "Kinran's aniso map"),
+    (Form::Khr, "khr", "Roughness and `KHR_materials_anisotropy`"),
+    (Form::Both, "both", "Both"),
+];
 
-impl Form {
-    fn aniso(self) -> bool {
-        self != Form::Khr
-    }
-
-    fn khr(self) -> bool {
-        self != Form::Aniso
-    }
-}
-
-/// File format.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Container {
-    /// KTX2
-    #[default]
-    Ktx2,
-    /// DDS with a DX10 header
-    Dds,
-    /// Both
-    Both,
-}
-
-impl Container {
-    /// The file extensions written.
-    pub fn extensions(self) -> &'static [&'static str] {
-        match self {
-            Container::Ktx2 => &["ktx2"],
-            Container::Dds => &["dds"],
-            Container::Both => &["ktx2", "dds"],
-        }
-    }
-}
-
-/// Texel format.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-#[allow(missing_docs, reason = "the names are the formats'")]
-pub enum FormatName {
-    Bc1,
-    Bc4,
-    Bc5,
-    Bc7,
-    Rgba8,
-    Rgba16f,
-}
-
-/// Block encoder.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum EncoderName {
-    /// Intel's, the fastest
-    Ispc,
-    /// Rust's, the same on every machine
-    Portable,
-}
-
-/// Time spent on a block.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum PresetName {
-    /// For previews
-    Fast,
-    /// For every day
-    Normal,
-    /// For release builds
-    Best,
-}
-
-impl From<PresetName> for Preset {
-    fn from(name: PresetName) -> Self {
-        match name {
-            PresetName::Fast => Preset::Fast,
-            PresetName::Normal => Preset::Normal,
-            PresetName::Best => Preset::Best,
-        }
-    }
-}
+/// Block encoders.
+const ENCODERS: &Choices<Encoder> = &[
+    (Encoder::Ispc, "ispc", "Intel's, the fastest"),
+    (Encoder::Portable, "portable", "Rust's, the same on every machine"),
+];
 
 impl Args {
     /// Where the files go.
@@ -333,54 +237,45 @@ impl Args {
             anisotropy: self.anisotropy,
             force_normal: self.force_normal,
             normal_blue: self.normal_blue,
-            color_space: self.color_space.map(|space| match space {
-                ColorSpace::Linear => Transfer::Linear,
-                ColorSpace::Srgb => Transfer::Srgb,
-            }),
+            color_space: self.color_space,
             layers: self.exr_layer.clone(),
-            wrap: self.wrap(),
+            wrap: [self.edges; 2],
         }
     }
 
-    /// A map's encoding: the role's measured default, changed by what flags say.
-    fn encoding(&self, role: Role, format: Option<FormatName>) -> Encoding {
-        let mut encoding = role.encoding();
-        if let Some(format) = format {
-            encoding.format = match format {
-                FormatName::Bc1 => Format::Bc1,
-                FormatName::Bc4 => Format::Bc4,
-                FormatName::Bc5 => Format::Bc5,
-                FormatName::Bc7 => Format::Bc7,
-                FormatName::Rgba8 => Format::Rgba8,
-                FormatName::Rgba16f => Format::Rgba16F,
-            };
-        }
-        if let Some(encoder) = self.encoder {
-            (encoding.encoder, encoding.preset) = match encoder {
-                EncoderName::Ispc => (Encoder::Ispc, Preset::Normal),
-                EncoderName::Portable => (Encoder::Portable, Preset::Fast),
-            };
-        }
-        if let Some(preset) = self.preset {
-            encoding.preset = preset.into();
-        }
-        encoding
+    /// How textures are made.
+    fn textures(&self) -> TextureOptions {
+        let mut how = TextureOptions::default();
+        (how.filter, how.kernel, how.container, how.zstd) =
+            (self.filter, self.kernel, self.container, self.zstd);
+        (how.normal_format, how.aniso_format, how.color_format) =
+            (self.normal_format, self.aniso_format, self.color_format);
+        (how.encoder, how.preset) = (self.encoder, self.preset);
+        how
     }
 
-    fn options(&self) -> SurfaceOptions {
-        let kernel = match self.kernel {
-            KernelName::Box => Kernel::Box,
-            KernelName::Tent => Kernel::Tent,
-        };
-        SurfaceOptions { filter: self.filter, kernel }
+    /// How a folder is baked.
+    fn folder_options(&self) -> FolderOptions {
+        let mut how = FolderOptions::default();
+        (how.textures, how.hints, how.source) = (self.textures(), self.hints(), self.source());
+        how.form = self.form.unwrap_or(how.form);
+        how
     }
 
-    fn wrap(&self) -> [Wrap; 2] {
-        [match self.edges {
-            Edges::Wrap => Wrap::Repeat,
-            Edges::Clamp => Wrap::Clamp,
-            Edges::Mirror => Wrap::Mirror,
-        }; 2]
+    /// How a glTF file is baked.
+    fn gltf_options(&self) -> Result<GltfOptions, Error> {
+        let mut how = GltfOptions::default();
+        (how.textures, how.green, how.source) = (self.textures(), self.green(), self.source());
+        how.form = self.form.unwrap_or(how.form);
+        (how.all_textures, how.estimate_normals) = (self.all_textures, self.curvature.estimate_normals);
+        how.allow_outside = self.model.allowed()?.to_vec();
+        (how.skin, how.curvature) = (self.curvature.skin.clone(), self.curvature.options());
+        Ok(how)
+    }
+
+    /// What reports name as their source.
+    fn source(&self) -> Option<String> {
+        way(self.output(), &self.input).filter(|_| !self.is_copy)
     }
 
     fn green(&self) -> Option<Green> {
@@ -408,7 +303,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         let reason = format!("{}; name one, or leave it out", flag.refusal());
         return Err(Error::flag_error_of(&args.input, format!("--{}", flag.name), reason));
     }
-    check_formats(args)?;
+    args.textures().check()?;
     let gltf = is_gltf(&args.input);
     if args.input.is_file() && !gltf {
         let reason = match has_extension(&args.input, "obj") {
@@ -467,92 +362,6 @@ fn with_a_way(error: Error, console: &Console) -> Error {
         }
         _ => error,
     }
-}
-
-/// Refuses formats that have fewer channels than the map.
-fn check_formats(args: &Args) -> Result<(), Error> {
-    let wanted = [
-        ("--normal-format", args.normal_format, 2, "normal maps need red and green"),
-        ("--aniso-format", args.aniso_format, 3, "these maps need red, green and blue"),
-        ("--color-format", args.color_format, 3, "colour needs red, green and blue"),
-    ];
-    if args.color_format == Some(FormatName::Rgba16f) {
-        return Err(Error::flag_error(
-            "--color-format rgba16f",
-            "colour maps hold 8 bits; choose bc7, bc1 or rgba8",
-        ));
-    }
-    for (flag, format, channels, reason) in wanted {
-        let (has, name) = match format {
-            Some(FormatName::Bc4) => (1, "bc4"),
-            Some(FormatName::Bc5) => (2, "bc5"),
-            _ => continue,
-        };
-        if has < channels {
-            let reason = format!("{reason}; choose bc7, bc1, rgba8 or rgba16f");
-            return Err(Error::flag_error(format!("{flag} {name}"), reason));
-        }
-    }
-    Ok(())
-}
-
-/// The role of a sheet's texels.
-fn role_of(sheet: Sheet) -> Role {
-    match sheet {
-        Sheet::Normal => Role::Normal,
-        Sheet::Roughness | Sheet::IsotropicRoughness => Role::Data,
-        Sheet::Aniso | Sheet::KhrAnisotropy => Role::Aniso,
-    }
-}
-
-/// The format that flags give a sheet.
-fn sheet_format(args: &Args, sheet: Sheet) -> Option<FormatName> {
-    if sheet == Sheet::Normal { args.normal_format } else { args.aniso_format }
-}
-
-/// The files of a texture.
-fn texture_files(args: &Args, name: &str) -> Vec<String> {
-    args.container.extensions().iter().map(|extension| format!("{name}.{extension}")).collect()
-}
-
-/// Texels of all levels.
-fn mip_texels((width, height): (u32, u32)) -> u64 {
-    let levels = 0..full_level_count(width, height);
-    levels.map(|level| u64::from(level_size(width, level)) * u64::from(level_size(height, level))).sum()
-}
-
-/// Bytes of a texture's files.
-fn texture_space(args: &Args, format: Format, size: (u32, u32)) -> Space {
-    Space::of_texture(args.container, args.zstd, format, size)
-}
-
-/// Writes a texture in the containers asked for; gives the reports of the files.
-fn write_texture(args: &Args, name: &str, map: Content, mut texture: Texture) -> Result<Vec<Output>, Error> {
-    std::fs::create_dir_all(args.output()).map_err(|e| kinran_image::Error::io(args.output(), e))?;
-    map.mark(&mut texture);
-    texture.metadata.insert("KinranFilter".into(), args.filter.name().into());
-    args.container
-        .extensions()
-        .iter()
-        .map(|extension| {
-            let file = format!("{name}.{extension}");
-            let path = args.output().join(&file);
-            let bytes = match *extension {
-                "dds" => encode_dds(&texture)?,
-                _ => encode_ktx2(&texture, (args.zstd > 0).then_some(args.zstd))?,
-            };
-            write_atomically(&path, &bytes)?;
-            Ok(Output::new(file, map, &texture, &bytes))
-        })
-        .collect()
-}
-
-/// A name that is a file's on every system: what is not a letter, digit, dash, dot or underscore becomes `_`.
-fn file_stem(name: &str) -> String {
-    let stem: String =
-        name.chars().map(|c| if c.is_alphanumeric() || "-._".contains(c) { c } else { '_' }).collect();
-    let stem = stem.trim_start_matches('.');
-    if stem.is_empty() { "material".into() } else { stem.into() }
 }
 
 /// The last component of a path, as text.

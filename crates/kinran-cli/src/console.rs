@@ -137,7 +137,7 @@ impl Console {
         if let Some(snippet) = error.snippet() {
             self.tell(snippet);
         }
-        if self.json && !matches!(error, Error::Entries { .. } | Error::Stdout(_)) {
+        if self.json && !matches!(error, Error::Entries { .. } | Error::Findings { .. } | Error::Stdout(_)) {
             // Where standard output is closed, standard error has told it.
             let _ = self.result(&Failed { error: Failure::of(error) }, "");
         }

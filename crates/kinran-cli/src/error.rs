@@ -51,6 +51,14 @@ pub enum Error {
         /// Whether anything was done at all, and not only planned.
         done: bool,
     },
+    /// A file breaks rules; each has been told.
+    #[error("{}: {}", path.display(), counted(*count, "rule is broken", "rules are broken"))]
+    Findings {
+        /// The file.
+        path: PathBuf,
+        /// How many.
+        count: usize,
+    },
     /// A picture could not be rendered.
     #[error(transparent)]
     Render(#[from] kinran_render::Error),
@@ -81,6 +89,57 @@ impl From<kinran_bake::manifest::ReadError> for Error {
         match error {
             kinran_bake::manifest::ReadError::Image(error) => error.into(),
             kinran_bake::manifest::ReadError::Manifest(error) => error.into(),
+        }
+    }
+}
+
+impl From<kinran::Error> for Error {
+    /// The same in the words of the command line: options are flags here.
+    fn from(error: kinran::Error) -> Self {
+        use kinran::Error as Task;
+        match error {
+            Task::Image(error) => error.into(),
+            Task::Scene(error) => error.into(),
+            Task::Folder(error) => error.into(),
+            Task::Option { option, given, file: Some(file), reason } => {
+                Error::flag_error_of(file, format!("--{option} {given}"), reason)
+            }
+            Task::Option { option, given, file: None, reason } => {
+                Error::flag_error(format!("--{option} {given}"), reason)
+            }
+            Task::OverInput { input } => Error::file_error(
+                input,
+                "the baked model would overwrite it; name another folder with --output",
+            ),
+            Task::OverMap { file } => Error::file_error(
+                file,
+                "is a map of the model that is baked and would be overwritten; name another folder with --output",
+            ),
+            Task::SameName { input, what, name, fix } => {
+                Error::file_error(input, format!("two {what} would both be written to {name}; {fix}"))
+            }
+            Task::NoMesh { input } => Error::file_error(
+                input,
+                "no mesh to measure curvature of has triangles; export the mesh with its faces",
+            ),
+            Task::Flat { input, mesh, primitive } => Error::file_error(
+                input,
+                format!(
+                    "{mesh}: primitive {primitive} has no NORMAL, which glTF draws flat, and curvature needs smooth \
+                     normals; export them, or add --estimate-normals"
+                ),
+            ),
+            Task::Mesh { input, mesh, error } => Error::file_error(input, format!("{mesh}: {error}")),
+            Task::Unturned { input, error } => {
+                Error::file_error(input, format!("its normal map cannot be turned as --y-down says: {error}"))
+            }
+            Task::Refused(error) => match error.downcast() {
+                Ok(error) => *error,
+                Err(error) => Error::Usage(error.to_string()),
+            },
+            Task::Cancelled => Cancelled.into(),
+            Task::Internal(reason) => Error::Internal(reason),
+            error => Error::Usage(error.to_string()),
         }
     }
 }
@@ -136,7 +195,7 @@ impl Error {
 
     /// What kind of error it is, in a word that stays the same: `usage` flags; `input` a file of the wrong kind or in
     /// the wrong place; `io` the system refused; `malformed` a damaged file; `unsupported` a sound one with something
-    /// that is not known; `maps` a folder of maps that cannot be understood; `manifest`; `entries` of a manifest failed;
+    /// that is not known; `maps` a folder of maps that cannot be understood; `manifest`; `entries` of a manifest failed; `findings` of `inspect --check`;
     /// `render`; `gpu`; `shader`; `cancelled` work that was stopped; `internal` a defect of the program.
     pub fn code(&self) -> &'static str {
         use kinran_bake::folder::FolderError;
@@ -169,6 +228,7 @@ impl Error {
             Error::Cancelled(_) => "cancelled",
             Error::Manifest(_) => "manifest",
             Error::Entries { .. } => "entries",
+            Error::Findings { .. } => "findings",
             Error::Render(RenderError::Gpu(_)) => "gpu",
             Error::Render(RenderError::Shader(_)) => "shader",
             Error::Render(RenderError::Scene(_)) => "render",
@@ -180,7 +240,7 @@ impl Error {
     pub fn file(&self) -> Option<&Path> {
         use kinran_bake::folder::FolderError;
         match self {
-            Error::File { path, .. } | Error::About { path, .. } => Some(path),
+            Error::File { path, .. } | Error::About { path, .. } | Error::Findings { path, .. } => Some(path),
             Error::Flag { file, .. } => file.as_deref(),
             Error::Retold(failure) => failure.file.as_deref(),
             Error::Image(error)

@@ -11,7 +11,6 @@ pub mod compare;
 mod compare_sheet;
 pub mod completions;
 mod console;
-pub mod content;
 pub mod demo;
 pub mod detail;
 mod error;

@@ -11,9 +11,9 @@ use kinran_scene::{
 };
 use serde::Deserialize;
 
-use crate::content::Content;
 use crate::view::file_name;
 use crate::{Error, Progress, outputs};
+use kinran::content::Content;
 
 /// The flag about files that a model names.
 #[derive(Clone, Debug, Default, PartialEq, Eq, clap::Args)]

@@ -4,12 +4,10 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use kinran_image::{Format, full_level_count, level_size};
+use kinran::report::{KnownFiles, WrittenFile};
+use kinran::{OutputFolder, Sink, Space};
 use kinran_scene::Packed;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use crate::bake::Container;
 use crate::{Console, Error};
 
 /// Whether a path ends in `.extension`, in any case.
@@ -129,37 +127,58 @@ pub(crate) fn changed_files(folder: &Path, packed: &Packed) -> Vec<String> {
     changed.map(|(_, (path, _))| relative(folder, path)).collect()
 }
 
-/// A file that was written, as the report beside it names it.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
-pub struct WrittenFile {
-    /// Its path from the report's folder, `/`-separated.
-    pub file: String,
-    /// Its size.
-    pub bytes: usize,
-    /// BLAKE3 of its bytes.
-    pub blake3: String,
+/// What is known of a file that was just written to `folder`.
+///
+/// # Errors
+/// Where it cannot be read.
+pub(crate) fn written_file(folder: &Path, file: impl Into<String>) -> Result<WrittenFile, Error> {
+    let file = file.into();
+    let path = folder.join(&file);
+    let bytes = match path.is_file() {
+        true => std::fs::read(&path),
+        false => Err(std::io::Error::other("is no regular file; move it away")),
+    };
+    let bytes = bytes.map_err(|e| kinran_image::Error::io(&path, e))?;
+    Ok(WrittenFile::new(file, &bytes))
 }
 
-impl WrittenFile {
-    /// What is known of a file by its bytes.
-    pub(crate) fn new(file: impl Into<String>, bytes: &[u8]) -> Self {
-        let blake3 = blake3::hash(bytes).to_hex().to_string();
-        WrittenFile { file: file.into(), bytes: bytes.len(), blake3 }
+/// Where a bake's files go: a folder in which nothing of a person's is overwritten.
+pub(crate) struct Output<'a> {
+    pub(crate) folder: &'a Path,
+    /// What is baked.
+    pub(crate) input: &'a Path,
+    /// Files that kinran did not write are overwritten all the same.
+    pub(crate) force: bool,
+    /// Is told where room may be short.
+    pub(crate) console: &'a Console,
+}
+
+impl Sink for Output<'_> {
+    fn expect(&self, names: &[String], space: Space) -> Result<(), kinran::Error> {
+        let checked = || {
+            refuse_other_source(self.folder, names, self.input, self.force)?;
+            refuse_foreign(self.folder, names, self.force)?;
+            check_space(self.folder, space.beyond(replaced_bytes(self.folder, names)))
+        };
+        match checked() {
+            Err(error) => Err(kinran::Error::Refused(Box::new(error))),
+            Ok(warning) => {
+                warning.into_iter().for_each(|warning| self.console.warn(warning));
+                Ok(())
+            }
+        }
     }
 
-    /// What is known of a file that was just written to `folder`.
-    ///
-    /// # Errors
-    /// Where it cannot be read.
-    pub(crate) fn of(folder: &Path, file: impl Into<String>) -> Result<Self, Error> {
-        let file = file.into();
-        let path = folder.join(&file);
-        let bytes = match path.is_file() {
-            true => std::fs::read(&path),
-            false => Err(std::io::Error::other("is no regular file; move it away")),
-        };
-        let bytes = bytes.map_err(|e| kinran_image::Error::io(&path, e))?;
-        Ok(WrittenFile::new(file, &bytes))
+    fn put(&self, name: &str, bytes: &[u8]) -> Result<(), kinran::Error> {
+        OutputFolder::new(self.folder).put(name, bytes)
+    }
+
+    fn get(&self, name: &str) -> Option<Vec<u8>> {
+        OutputFolder::new(self.folder).get(name)
+    }
+
+    fn place(&self, name: &str) -> Option<PathBuf> {
+        OutputFolder::new(self.folder).place(name)
     }
 }
 
@@ -168,21 +187,6 @@ const REPORTS: [&str; 2] = [".kinran.json", ".detail.json"];
 
 /// Files that a sentence on earlier runs names.
 const KEPT_NAMED: usize = 4;
-
-/// A report, as far as it says which files are its own.
-#[derive(Deserialize)]
-struct KnownFiles {
-    written: Vec<WrittenFile>,
-    #[serde(default)]
-    kept: Vec<WrittenFile>,
-    source: Option<String>,
-}
-
-impl KnownFiles {
-    fn files(self) -> impl Iterator<Item = WrittenFile> {
-        self.written.into_iter().chain(self.kept)
-    }
-}
 
 fn is_report(file: &str) -> bool {
     REPORTS.iter().any(|end| file.ends_with(end))
@@ -210,7 +214,7 @@ pub(crate) fn refuse_foreign(folder: &Path, files: &[String], force: bool) -> Re
             read_report(&path).is_some()
         } else {
             let known = known.get_or_insert_with(|| known_files(folder));
-            known.contains(&WrittenFile::of(folder, file)?)
+            known.contains(&written_file(folder, file)?)
         };
         if !ours {
             let reason = "kinran did not write this file, or it was changed since; move it away, name another folder \
@@ -251,7 +255,7 @@ pub(crate) fn refuse_other_source(
 
 /// The way from a folder to a path, `/`-separated; nothing where there is none, as between two drives.
 pub(crate) fn way(folder: &Path, path: &Path) -> Option<String> {
-    let (folder, path) = (folder.canonicalize().ok()?, path.canonicalize().ok()?);
+    let (folder, path) = (real(folder)?, real(path)?);
     let common = folder.components().zip(path.components()).take_while(|(a, b)| a == b).count();
     let up = folder.components().skip(common).map(|_| "..".into());
     let down = path.components().skip(common).map(|part| part.as_os_str().to_string_lossy().into_owned());
@@ -263,20 +267,18 @@ pub(crate) fn way(folder: &Path, path: &Path) -> Option<String> {
     }
 }
 
+/// Where a path leads, also one whose last folders are yet to be made.
+fn real(path: &Path) -> Option<PathBuf> {
+    let full = std::path::absolute(path).ok()?;
+    let there = full.ancestors().find(|part| part.exists())?;
+    Some(there.canonicalize().ok()?.components().chain(full.strip_prefix(there).ok()?.components()).collect())
+}
+
 /// What the reports in a folder name.
 fn known_files(folder: &Path) -> BTreeSet<WrittenFile> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let reports = entries.map(|e| e.path()).filter(|path| is_report(&path.to_string_lossy()));
     reports.filter_map(|path| read_report(&path)).flat_map(KnownFiles::files).collect()
-}
-
-/// What earlier runs wrote beside `report`, this one did not, and nobody has changed since: textures of another
-/// container or form. Asked before the report is written anew.
-pub(crate) fn kept_files(folder: &Path, report: &str, written: &[WrittenFile]) -> Vec<WrittenFile> {
-    let Some(earlier) = read_report(&folder.join(report)) else { return Vec::new() };
-    let is_new = |kept: &WrittenFile| written.iter().all(|w| w.file != kept.file) && kept.file != report;
-    let is_there = |kept: &WrittenFile| WrittenFile::of(folder, &*kept.file).is_ok_and(|now| now == *kept);
-    earlier.files().filter(|kept| is_new(kept) && is_there(kept)).collect()
 }
 
 /// A line on files that [`kept_files`] found; empty where there are none.
@@ -296,59 +298,11 @@ fn read_report(path: &Path) -> Option<KnownFiles> {
     serde_json::from_slice(&std::fs::read(path).ok()?).ok()
 }
 
-/// Bytes that files will take, as far as that can be told before they are made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct Space {
-    /// They take no less.
-    pub least: u64,
-    /// They take no more, but for small files such as reports.
-    pub most: u64,
-}
-
-/// What Zstandard leaves of a mip chain at least, as one over this; chosen by eye: BC7 of smooth maps keeps an eighth.
-const ZSTD_LEAST: u64 = 16;
-
-impl Space {
-    /// That of files whose size is known.
-    pub(crate) fn exact(bytes: u64) -> Self {
-        Space { least: bytes, most: bytes }
-    }
-
-    /// That of a texture with all its mips; `zstd` is the level of KTX2 files, 0 for none.
-    pub(crate) fn of_texture(
-        container: Container,
-        zstd: i32,
-        format: Format,
-        (width, height): (u32, u32),
-    ) -> Self {
-        let levels = 0..full_level_count(width, height);
-        let chain =
-            levels.map(|level| format.level_bytes(level_size(width, level), level_size(height, level)));
-        let chain = chain.sum::<usize>() as u64;
-        let mut space = Space::default();
-        for extension in container.extensions() {
-            let shrinks = *extension == "ktx2" && zstd > 0;
-            space.add(Space { least: if shrinks { chain / ZSTD_LEAST } else { chain }, most: chain });
-        }
-        space
-    }
-
-    /// What is needed where files of so many bytes make room.
-    pub(crate) fn beyond(self, replaced: u64) -> Self {
-        Space { least: self.least.saturating_sub(replaced), most: self.most.saturating_sub(replaced) }
-    }
-
-    /// As people read it.
-    pub(crate) fn text(self) -> String {
-        match (bytes_text(self.least), bytes_text(self.most)) {
-            (least, most) if least == most => most,
-            (least, most) => format!("{least} to {most}"),
-        }
-    }
-
-    pub(crate) fn add(&mut self, other: Space) {
-        self.least += other.least;
-        self.most += other.most;
+/// Space as people read it.
+pub(crate) fn space_text(space: Space) -> String {
+    match (bytes_text(space.least), bytes_text(space.most)) {
+        (least, most) if least == most => most,
+        (least, most) => format!("{least} to {most}"),
     }
 }
 
@@ -439,7 +393,7 @@ mod tests {
         refused(&["a.ktx2"], true).unwrap();
         refused(&["b.ktx2", "m.kinran.json"], false).unwrap();
 
-        let report = serde_json::json!({ "written": [WrittenFile::of(folder.path(), "a.ktx2").unwrap()] });
+        let report = serde_json::json!({ "written": [written_file(folder.path(), "a.ktx2").unwrap()] });
         write("m.kinran.json", &report.to_string());
         refused(&["a.ktx2", "m.kinran.json"], false).unwrap();
         write("a.ktx2", "b");
@@ -456,6 +410,7 @@ mod tests {
         assert!(other("y").unwrap_err().to_string().contains("was baked from"));
         assert_eq!(way(&path("x"), &path("y")).as_deref(), Some("../y"));
         assert_eq!(way(&path("x"), &path("x")).as_deref(), Some("."));
+        assert_eq!(way(&path("not/yet"), &path("x")).as_deref(), Some("../../x"));
         std::fs::create_dir(path("d.ktx2")).unwrap();
         assert!(refused(&["d.ktx2"], true).unwrap_err().contains("is a folder"));
     }

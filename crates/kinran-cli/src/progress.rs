@@ -1,9 +1,11 @@
+use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use kinran::{Cancel, Task};
 use kinran_image::Cancelled;
 
 /// A command shorter than this shows nothing.
@@ -159,6 +161,37 @@ impl Progress {
     }
 }
 
+/// Bars of a task of the library.
+pub(crate) struct Bars {
+    tell: Box<dyn Fn(kinran::Progress<'_>) + Send + Sync>,
+    cancel: Arc<Cancel>,
+}
+
+impl Bars {
+    pub(crate) fn new(progress: Progress) -> Self {
+        let running: Mutex<BTreeMap<String, Stage>> = Mutex::default();
+        let cancel = Arc::new(Cancel::new());
+        let stop = cancel.clone();
+        let tell = move |told: kinran::Progress<'_>| {
+            let name = told.to_string();
+            let mut running = lock(&running);
+            if told.is_over {
+                running.remove(&name);
+                return;
+            }
+            let stage = running.entry(name.clone()).or_insert_with(|| progress.stage(name, told.total));
+            if stage.set(told.done, told.total).is_err() {
+                stop.cancel();
+            }
+        };
+        Bars { tell: Box::new(tell), cancel }
+    }
+
+    pub(crate) fn task(&self) -> Task<'_> {
+        Task { tell: &*self.tell, cancel: &self.cancel }
+    }
+}
+
 impl Stage {
     /// Tells of so many units more that are to be done; from any thread.
     pub fn expect(&self, units: u64) {
@@ -179,6 +212,13 @@ impl Stage {
     /// Counts `units` more as done, of work that goes on to its end; from any thread.
     pub fn add(&self, units: u64) {
         let _ = self.tick(units);
+    }
+
+    /// So many units of so many are done; none is ever taken back, and one in all is no extent.
+    fn set(&self, done: u64, total: u64) -> Result<(), Cancelled> {
+        self.work.total.fetch_max(if total > 1 { total } else { 0 }, Ordering::Relaxed);
+        self.work.done.fetch_max(done, Ordering::Relaxed);
+        self.tick(0)
     }
 }
 

@@ -6,6 +6,10 @@ mod profile_file;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
+use kinran::content::Content;
+use kinran::options::Container;
+use kinran::report::{WrittenFile, kept_files};
+use kinran::{OutputFolder, Space};
 use kinran_bake::skin_lut::{
     INTERPOLATION_GRID, Profile, Table, TableFormat, ambient_table, penumbra_table,
     punctual_interpolation_error, punctual_table,
@@ -15,13 +19,11 @@ use kinran_shading::skin::profile::{Gaussian, ProfileError};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::bake::Container;
-use crate::content::Content;
 use crate::outputs::{
-    Space, WrittenFile, beside, check_folder, check_space, kept_files, kept_remark, refuse_foreign,
-    refuse_input, replaced_bytes, tell_place,
+    beside, check_folder, check_space, kept_remark, refuse_foreign, refuse_input, replaced_bytes, tell_place,
+    written_file,
 };
-use crate::values::{number, size};
+use crate::values::{CONTAINERS, choice, number, size};
 use crate::{Console, Error};
 
 /// Makes the tables that skin is lit with
@@ -89,7 +91,7 @@ pub struct Args {
     pub format: FormatName,
 
     /// File format of the tables
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, default_value = "ktx2", value_parser = choice(CONTAINERS))]
     pub container: Container,
 
     /// Also the table of light that scatters into penumbras
@@ -247,9 +249,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let title = format!("{}, {}", args.name, report.profile);
     plot::plot(&title, &punctual, &ambient, args.range)
         .write(&args.output().join(format!("{}.png", args.name)))?;
-    report.written =
-        files.iter().map(|file| WrittenFile::of(&args.output(), file)).collect::<Result<_, _>>()?;
-    report.kept = kept_files(&args.output(), &sidecar, &report.written);
+    report.written = files.iter().map(|file| written_file(&args.output(), file)).collect::<Result<_, _>>()?;
+    report.kept = kept_files(&OutputFolder::new(args.output()), &sidecar, &report.written);
     let mut text = serde_json::to_string_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
     text.push('\n');
     write_atomically(&args.output().join(sidecar), text.as_bytes())?;

@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use clap::ValueEnum;
 use glam::{Mat3, Vec2, Vec3, Vec4, vec2, vec3};
+use kinran::bake::{Joined, measured, meshes, pose_scale, triangles_of, unit};
 use kinran_bake::aniso::Filter;
 use kinran_bake::curvature::{
-    BLUR, CurvatureError, Mesh, Options, bake_curvature, estimated_normals, principal,
+    BLUR, CurvatureError, Mesh, Method, Options, bake_curvature, estimated_normals, principal,
 };
 use kinran_bake::skin_lut::{Profile, Table, punctual_table};
 use kinran_image::untold;
@@ -22,15 +23,13 @@ use kinran_shading::skin::profile::Gaussian;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::bake::curvature::{
-    Blur, Joined, MethodName, deviations, measured, meshes, pose_scale, triangles_of, unit,
-};
+use crate::bake::curvature::{Blur, METHODS, deviations};
 use crate::model::{model_at, read_scene};
 use crate::picture::{Color, INK, PAPER, Picture, Row, grid};
 use crate::skin::{SIZE, profile, skin_table};
 use crate::skin_lut::plot::plot;
 use crate::surfaces::{Mips, scene_surfaces};
-use crate::values::{counted, number, vector};
+use crate::values::{choice, counted, number, vector};
 use crate::view::{View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, outputs};
 
@@ -82,8 +81,8 @@ pub struct Args {
     pub crop: Option<[f32; 4]>,
 
     /// How tensors are found
-    #[arg(long, value_enum, default_value_t)]
-    pub curvature_method: MethodName,
+    #[arg(long, value_name = "CURVATURE_METHOD", default_value = "normals", value_parser = choice(METHODS))]
+    pub curvature_method: Method,
 
     /// Deviations of the Gaussians that blur curvature, mm, or "none" [default: 8,2.3]
     #[arg(long, value_name = "MM,MM", value_parser = deviations)]
@@ -355,7 +354,7 @@ fn bake(
         let millimetres = args.unit_mm.map_or_else(|| unit(scene, &group, &name, warnings), f64::from)
             / pose_scale(&scene.primitives[group[0]]);
         let options = Options {
-            method: args.curvature_method.into(),
+            method: args.curvature_method,
             millimetres,
             blur: args.curvature_blur.as_ref().map_or_else(|| BLUR.to_vec(), |blur| blur.0.clone()),
             clamp: true,

@@ -2,10 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Vec3;
+use kinran::content::Content;
+use kinran::options::Container;
 use kinran_bake::aniso::Filter;
-use kinran_image::MAX_SIDE;
+use kinran_image::{Format, MAX_SIDE, Preset};
 
 /// `WIDTHxHEIGHT` in pixels, or one number for a square.
 pub(crate) fn size(text: &str) -> Result<(u32, u32), String> {
@@ -77,6 +79,51 @@ pub(crate) fn range_in_words(message: &str) -> String {
 /// Names, one after the other, as messages list them.
 pub(crate) fn list(names: &[String]) -> String {
     if names.is_empty() { "none".into() } else { names.join(", ") }
+}
+
+/// What can be chosen: each value with the word for it and what help says of it.
+pub(crate) type Choices<T> = [(T, &'static str, &'static str)];
+
+/// Takes one of a few values by the word for it, and tells help and completions which there are.
+pub(crate) fn choice<T: Copy + Send + Sync + 'static>(
+    all: &'static Choices<T>,
+) -> impl TypedValueParser<Value = T> {
+    let words = all.iter().map(|(_, word, about)| match about.is_empty() {
+        true => PossibleValue::new(word),
+        false => PossibleValue::new(word).help(about),
+    });
+    let named = |name: &str| all.iter().find(|(_, word, _)| *word == name).map(|(value, ..)| *value);
+    PossibleValuesParser::new(words).map(move |name| named(&name).expect("only known words pass"))
+}
+
+/// Texel formats.
+pub(crate) const FORMATS: &Choices<Format> = &[
+    (Format::Bc1, "bc1", ""),
+    (Format::Bc4, "bc4", ""),
+    (Format::Bc5, "bc5", ""),
+    (Format::Bc7, "bc7", ""),
+    (Format::Rgba8, "rgba8", ""),
+    (Format::Rgba16F, "rgba16f", ""),
+];
+
+/// File formats of textures.
+pub(crate) const CONTAINERS: &Choices<Container> = &[
+    (Container::Ktx2, "ktx2", "KTX2"),
+    (Container::Dds, "dds", "DDS with a DX10 header"),
+    (Container::Both, "both", "Both"),
+];
+
+/// Time spent on a block.
+pub(crate) const PRESETS: &Choices<Preset> = &[
+    (Preset::Fast, "fast", "For previews"),
+    (Preset::Normal, "normal", "For every day"),
+    (Preset::Best, "best", "For release builds"),
+];
+
+/// What a texture holds.
+pub(crate) fn content() -> impl TypedValueParser<Value = Content> {
+    PossibleValuesParser::new(Content::ALL.map(Content::name))
+        .map(|name| Content::named(&name).expect("only names of contents pass"))
 }
 
 /// Takes a filter by its name, and tells help and completions which there are.

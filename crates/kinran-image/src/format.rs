@@ -18,6 +18,32 @@ pub enum Format {
 }
 
 impl Format {
+    /// All formats.
+    pub const ALL: [Format; 6] =
+        [Format::Bc1, Format::Bc4, Format::Bc5, Format::Bc7, Format::Rgba8, Format::Rgba16F];
+
+    /// What reports, messages and flags call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Bc1 => "bc1",
+            Format::Bc4 => "bc4",
+            Format::Bc5 => "bc5",
+            Format::Bc7 => "bc7",
+            Format::Rgba8 => "rgba8",
+            Format::Rgba16F => "rgba16f",
+        }
+    }
+
+    /// Channels that it keeps.
+    pub fn channels(self) -> usize {
+        match self {
+            Format::Bc4 => 1,
+            Format::Bc5 => 2,
+            Format::Bc1 => 3,
+            Format::Bc7 | Format::Rgba8 | Format::Rgba16F => 4,
+        }
+    }
+
     /// Texels along a side of the unit the bytes come in: 4 for block formats, 1 for the others.
     pub fn block_side(self) -> u32 {
         match self {

@@ -27,6 +27,7 @@
 mod block;
 mod dds_file;
 mod error;
+mod files;
 mod format;
 mod image;
 mod ktx2_file;
@@ -43,16 +44,17 @@ mod write;
 pub use block::{Encoder, Encoding, Preset, Role, decode, encode, encode_half, encode_parallel};
 pub use dds_file::{decode_dds, encode_dds};
 pub use error::{Error, io_reason};
+pub use files::{Disk, Entry, Files, Memory, plain};
 pub use format::{Format, Transfer};
 pub use image::{Channels, Image, MAX_IMAGE_BYTES, MAX_SIDE, Pixels};
 pub use ktx2_file::{decode_ktx2, encode_ktx2};
-pub use read::{IMAGE_EXTENSIONS, decode_image, has_image_extension, read_image, read_layer};
+pub use read::{IMAGE_EXTENSIONS, decode_image, decode_layer, has_image_extension, read_image, read_layer};
 pub use size::{image_size, image_size_of};
 pub use texture::{Level, Texture, full_level_count, level_size};
 pub use texture_file::{decode_texture, read_texture, write_texture};
 pub use tick::{Cancelled, Tick, untold};
 pub use unfinished::{Unfinished, remove_unfinished};
 pub use write::{
-    encode_png, is_temporary, write_atomically, write_atomically_in, write_atomically_with, write_exr,
-    write_exr_planes, write_png,
+    encode_exr_planes, encode_png, is_temporary, write_atomically, write_atomically_in,
+    write_atomically_with, write_exr, write_exr_planes, write_png,
 };

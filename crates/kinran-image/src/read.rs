@@ -65,12 +65,18 @@ pub fn read_layer(path: &Path, layer: Option<&str>) -> Result<Image, Error> {
     if file.metadata().map_err(|e| Error::io(path, e))?.is_dir() {
         return Err(Error::io(path, std::io::ErrorKind::IsADirectory.into()));
     }
-    decode(
-        path,
-        BufReader::with_capacity(1 << 16, file),
-        layer,
-        "say which is meant with --exr-layer, or save that one alone",
-    )
+    decode(path, BufReader::with_capacity(1 << 16, file), layer, NAME_LAYER)
+}
+
+/// What a person does about a file of several layers who can name one.
+const NAME_LAYER: &str = "say which is meant with --exr-layer, or save that one alone";
+
+/// As [`read_layer`], of a file that is in memory already; `name` stands for it in errors, and its extension tells a TGA.
+///
+/// # Errors
+/// As [`read_layer`].
+pub fn decode_layer(name: &Path, bytes: &[u8], layer: Option<&str>) -> Result<Image, Error> {
+    decode(name, Cursor::new(bytes), layer, NAME_LAYER)
 }
 
 /// Decodes an image file that is in memory already; `name` stands for it in errors, and its extension

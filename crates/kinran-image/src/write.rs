@@ -206,6 +206,16 @@ pub fn write_exr_planes(path: &Path, size: (u32, u32), planes: Vec<(&str, Vec<f3
     write_atomically(path, bytes.get_ref())
 }
 
+/// The bytes that [`write_exr_planes`] writes.
+///
+/// # Errors
+/// [`Error::Unsupported`] where the encoder refuses.
+pub fn encode_exr_planes(size: (u32, u32), planes: Vec<(&str, Vec<f32>)>) -> Result<Vec<u8>, Error> {
+    let mut bytes = Cursor::new(Vec::new());
+    encode_exr_to(size, planes, &mut bytes).map_err(|e| Error::Unsupported(format!("EXR: {e}")))?;
+    Ok(bytes.into_inner())
+}
+
 fn encode_exr_to(
     size: (u32, u32),
     planes: Vec<(&str, Vec<f32>)>,

@@ -5,16 +5,15 @@ mod mesh;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
 
-use kinran_image::{untold, write_atomically};
+use kinran_image::{Disk, Files, untold, write_atomically};
 use percent_encoding::{AsciiSet, CONTROLS, percent_encode};
 use serde_json::{Map, Value, json};
 
 use crate::Error;
 use crate::compressed::{decompress, is_compressed};
-use crate::container::{
-    Purpose, Refusal, Target, beside, fetch, folder_of, join, locate, parse_uri, read_regular_file, split,
-};
+use crate::container::{Purpose, Refusal, Target, beside, fetch, folder_of, join, locate, parse_uri, split};
 use crate::load::WEBP;
 
 pub use mesh::Attribute;
@@ -128,6 +127,8 @@ const PATH: &AsciiSet = &CONTROLS
 #[derive(Clone, Debug)]
 pub struct Document {
     path: PathBuf,
+    /// Where it and what it names are read from.
+    source: Arc<dyn Files>,
     /// Folders whose files it may name besides those of its own.
     allowed: Vec<PathBuf>,
     json: Object,
@@ -163,9 +164,25 @@ impl Document {
     /// # Errors
     /// As [`Document::open`].
     pub fn open_allowing(path: impl AsRef<Path>, allowed: &[PathBuf]) -> Result<Document, Error> {
+        Document::open_in(&Disk, path, allowed)
+    }
+
+    /// As [`Document::open_allowing`], of files that may be elsewhere than on a disk.
+    ///
+    /// # Errors
+    /// As [`Document::open`].
+    pub fn open_in(
+        files: &dyn Files,
+        path: impl AsRef<Path>,
+        allowed: &[PathBuf],
+    ) -> Result<Document, Error> {
         let path = path.as_ref();
-        let bytes = read_regular_file(path).map_err(|error| Error::io(path, error))?;
-        Ok(Document { allowed: allowed.to_vec(), ..Document::from_bytes(path, &bytes)? })
+        let bytes = files.read(path).map_err(|error| Error::io(path, error))?;
+        Ok(Document {
+            source: files.share(),
+            allowed: allowed.to_vec(),
+            ..Document::from_bytes(path, &bytes)?
+        })
     }
 
     /// As [`Document::open`], from the bytes of the file `path`, which need not exist as long as nothing
@@ -183,6 +200,7 @@ impl Document {
         let original_extensions = used_extensions(&json);
         Ok(Document {
             path: path.to_path_buf(),
+            source: Arc::new(Disk),
             allowed: Vec::new(),
             json,
             bin: container.bin.map(<[u8]>::to_vec),
@@ -226,7 +244,10 @@ impl Document {
     /// that it may not name, and none that is a device, a pipe or a folder.
     pub fn files(&self) -> Vec<PathBuf> {
         let files: BTreeSet<PathBuf> = self.own_files().into_iter().collect();
-        files.into_iter().filter(|file| file.is_file() || !file.exists()).collect()
+        files
+            .into_iter()
+            .filter(|file| self.source.is_file(file) || self.source.canonical(file).is_err())
+            .collect()
     }
 
     /// Refuses a document that names a file outside of its own folder and of those that are allowed; none is read.
@@ -238,7 +259,7 @@ impl Document {
             for (i, entry) in array(&self.json, list).iter().enumerate() {
                 let uri = entry.get("uri").and_then(Value::as_str).unwrap_or("");
                 let Ok(Target::File(file)) = parse_uri(uri) else { continue };
-                let located = locate(&folder_of(&self.path), &self.allowed, &file);
+                let located = locate(&*self.source, &folder_of(&self.path), &self.allowed, &file);
                 if let Err(Refusal::Outside { folder }) = located {
                     let (path, what) = (self.path.clone(), format!("{what} {i}"));
                     return Err(Error::Outside { path, what, file: file.into_owned(), folder });
@@ -493,7 +514,18 @@ impl Document {
     /// # Errors
     /// As [`Document::write`], but for what cannot be written.
     pub fn pack(&self, path: impl AsRef<Path>) -> Result<Packed, Error> {
-        let path = path.as_ref();
+        self.pack_to(path.as_ref(), true)
+    }
+
+    /// As [`Document::pack`], for files that go to no disk: `path` is a name, and nothing can be in their way.
+    ///
+    /// # Errors
+    /// As [`Document::pack`].
+    pub fn pack_in_memory(&self, path: impl AsRef<Path>) -> Result<Packed, Error> {
+        self.pack_to(path.as_ref(), false)
+    }
+
+    fn pack_to(&self, path: &Path, on_disk: bool) -> Result<Packed, Error> {
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         let glb = match extension.as_deref() {
             Some("glb" | "vrm") => true,
@@ -503,14 +535,15 @@ impl Document {
                 return Err(Error::unsupported(path, reason));
             }
         };
-        if same_file(path, &self.path) {
+        if on_disk && self.is_at(&self.path, path) {
             return Err(Error::unsupported(
                 path,
                 "is the document that was read; write to another name, so that the original stays",
             ));
         }
 
-        let mut output = Output { json: self.json.clone(), files: BTreeMap::new(), warnings: Vec::new() };
+        let (json, files) = (self.json.clone(), BTreeMap::new());
+        let mut output = Output { json, on_disk, files, warnings: Vec::new() };
         if !glb && !self.chunks.is_empty() {
             let kinds = self.chunks.iter().map(|(kind, _)| String::from_utf8_lossy(kind).into_owned());
             output.warnings.push(format!(
@@ -778,7 +811,7 @@ impl Document {
         let inside =
             Path::new(&relative).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
         let folder = path.parent().unwrap_or(Path::new(""));
-        if same_file(folder.join("."), self.folder().join(".")) {
+        if output.on_disk && self.is_at(&self.folder().join("."), &folder.join(".")) {
             return Ok(uri.to_owned());
         }
         let bytes = self.fetch(&uri_of(&relative), what, purpose)?;
@@ -818,8 +851,8 @@ impl Document {
     /// Plans a file; two different contents for one name are refused, and so is a file of the original.
     fn emit(&self, file: PathBuf, bytes: Vec<u8>, output: &mut Output) -> Result<(), Error> {
         let clash = output.files.get(&file).is_some_and(|planned| *planned != bytes);
-        let original = std::fs::read(&file).is_ok_and(|existing| existing != bytes)
-            && self.own_files().iter().any(|own| same_file(own, &file));
+        let differs = || std::fs::read(&file).is_ok_and(|existing| existing != bytes);
+        let original = output.on_disk && differs() && self.names_file(&file);
         if clash || original {
             return Err(Error::unsupported(
                 file,
@@ -840,6 +873,17 @@ impl Document {
                 _ => None,
             })
             .collect()
+    }
+
+    /// Whether a file on the disk is one that the document names.
+    pub fn names_file(&self, there: &Path) -> bool {
+        self.own_files().iter().any(|own| self.is_at(own, there))
+    }
+
+    /// Whether what the document calls `own` is the file or folder `there` of the disk.
+    fn is_at(&self, own: &Path, there: &Path) -> bool {
+        let place = self.source.place(own);
+        place.is_some_and(|place| there.canonicalize().is_ok_and(|there| there == place))
     }
 
     fn folder(&self) -> PathBuf {
@@ -882,7 +926,7 @@ impl Document {
     }
 
     fn fetch(&self, uri: &str, what: &str, purpose: Purpose) -> Result<Vec<u8>, Error> {
-        fetch(&self.path, what, purpose, uri, &beside(&self.path, &self.allowed))
+        fetch(&self.path, what, purpose, uri, &beside(&*self.source, &self.path, &self.allowed))
     }
 }
 
@@ -917,6 +961,8 @@ impl Packed {
 /// A document on its way out.
 struct Output {
     json: Object,
+    /// Whether its files replace what lies on a disk.
+    on_disk: bool,
     /// Files beside the document and their content.
     files: BTreeMap<PathBuf, Vec<u8>>,
     warnings: Vec<String>,
@@ -1153,10 +1199,4 @@ fn bin_name(path: &Path, buffer: usize) -> String {
 
 fn uri_of(relative: &str) -> String {
     percent_encode(relative.as_bytes(), PATH).to_string()
-}
-
-/// Whether two paths lead to one existing file.
-fn same_file(a: impl AsRef<Path>, b: impl AsRef<Path>) -> bool {
-    let canonical = |path: &Path| path.canonicalize();
-    matches!((canonical(a.as_ref()), canonical(b.as_ref())), (Ok(a), Ok(b)) if a == b)
 }

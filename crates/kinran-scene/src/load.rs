@@ -9,14 +9,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, DVec4, Mat3, Quat, Vec2, Vec3, Vec4};
-use kinran_image::{Cancelled, Image, Pixels, Texture, Tick, Transfer, untold};
+use kinran_image::{Cancelled, Disk, Files, Image, Pixels, Texture, Tick, Transfer, untold};
 use rayon::prelude::*;
 use serde::Deserialize;
 
 use self::pose::Poses;
 use crate::accessor::Accessors;
 use crate::compressed::{decompress, is_compressed};
-use crate::container::{GivenResolver, Purpose, Resolver, beside, fetch, given, read_regular_file, split};
+use crate::container::{GivenResolver, Purpose, Resolver, beside, fetch, given, split};
 use crate::obj::{glb_from_obj, names_materials};
 use crate::{
     AlphaMode, Anisotropy, Camera, DiffuseTransmission, Error, FUZZ_EXTENSION, Fuzz, FuzzAttenuation,
@@ -168,14 +168,29 @@ impl Scene {
         expect: &dyn Fn(u64),
         tick: &Tick<'_>,
     ) -> Result<Scene, Error> {
+        Scene::load_in(&Disk, path, allowed, needs, expect, tick)
+    }
+
+    /// As [`Scene::load_watched`], of files that may be elsewhere than on a disk.
+    ///
+    /// # Errors
+    /// As [`Scene::load_watched`].
+    pub fn load_in(
+        files: &dyn Files,
+        path: impl AsRef<Path>,
+        allowed: &[PathBuf],
+        needs: &Needs,
+        expect: &dyn Fn(u64),
+        tick: &Tick<'_>,
+    ) -> Result<Scene, Error> {
         let path = path.as_ref();
-        let mut bytes = read_regular_file(path).map_err(|error| Error::io(path, error))?;
+        let mut bytes = files.read(path).map_err(|error| Error::io(path, error))?;
         let mut without_materials = false;
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
             without_materials = names_materials(&bytes);
             bytes = glb_from_obj(path, &bytes)?;
         }
-        let mut scene = Scene::read(path, &bytes, &beside(path, allowed), needs, expect, tick)?;
+        let mut scene = Scene::read(path, &bytes, &beside(files, path, allowed), needs, expect, tick)?;
         if without_materials {
             let name = path.display();
             scene.warnings.push(format!(

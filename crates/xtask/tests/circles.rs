@@ -11,7 +11,8 @@ use std::path::Path;
 type Module = Vec<String>;
 
 /// Crates whose files are looked at.
-const CRATES: [&str; 7] = [
+const CRATES: [&str; 8] = [
+    "kinran",
     "kinran-bake",
     "kinran-image",
     "kinran-render",

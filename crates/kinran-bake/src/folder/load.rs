@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use kinran_image::{Channels, Image, Pixels, Transfer, read_layer};
+use kinran_image::{Channels, Disk, Files, Image, Pixels, Transfer, decode_layer};
 use kinran_scene::Wrap;
 use kinran_shading::{alpha_from_roughness, alphas_from_khr_anisotropy};
 use rayon::prelude::*;
@@ -27,6 +27,8 @@ pub struct LoadedMap {
     pub role: Role,
     /// Where it was read.
     pub path: PathBuf,
+    /// BLAKE3 of the file's bytes, in hexadecimal digits.
+    pub blake3: String,
     /// Its samples.
     pub image: Arc<Image>,
     /// What was chosen when it was read, a part of a sentence each: the layer, how colour is encoded.
@@ -53,8 +55,16 @@ pub struct LoadedMaterial {
 /// Alphas along and across the direction, of a perceptual roughness and a level of anisotropy.
 type AlphaLaw = fn(f32, f32) -> (f32, f32);
 
-/// Images already read, by path.
-pub(super) type Images = BTreeMap<PathBuf, Arc<Image>>;
+/// A file that was read.
+#[derive(Clone)]
+pub(super) struct ReadImage {
+    image: Arc<Image>,
+    /// Of its bytes.
+    blake3: String,
+}
+
+/// Files already read, by path.
+pub(super) type Images = BTreeMap<PathBuf, ReadImage>;
 
 impl MaterialMaps {
     /// Reads every map and checks that it holds what its name says. Maps may differ in size.
@@ -64,24 +74,37 @@ impl MaterialMaps {
     /// its unlabelled green clearly points down, or a direction or anisotropy map has not the channels it
     /// needs.
     pub fn load(&self) -> Result<LoadedMaterial, FolderError> {
+        self.load_in(&Disk)
+    }
+
+    /// As [`MaterialMaps::load`], of maps that may be elsewhere than on a disk.
+    ///
+    /// # Errors
+    /// As [`MaterialMaps::load`].
+    pub fn load_in(&self, files: &dyn Files) -> Result<LoadedMaterial, FolderError> {
         let (mut images, mut notes) = (Images::new(), self.warnings.clone());
-        self.settled(&mut images, &mut notes)?.load_settled(images, notes)
+        self.settled(files, &mut images, &mut notes)?.load_settled(files, images, notes)
     }
 
     /// Loads maps whose twins were compared; `known` are images that were read for that.
-    fn load_settled(&self, known: Images, mut notes: Vec<String>) -> Result<LoadedMaterial, FolderError> {
+    fn load_settled(
+        &self,
+        files: &dyn Files,
+        known: Images,
+        mut notes: Vec<String>,
+    ) -> Result<LoadedMaterial, FolderError> {
         let paths: BTreeSet<&PathBuf> = self.files.iter().map(|(_, path)| path).collect();
-        let read: Vec<Result<(PathBuf, Arc<Image>), FolderError>> = (paths.into_par_iter())
+        let read: Vec<Result<(PathBuf, ReadImage), FolderError>> = (paths.into_par_iter())
             .map(|path| {
-                let image = known.get(path).cloned().map_or_else(|| self.image(path).map(Arc::new), Ok)?;
-                Ok((path.clone(), image))
+                let read = known.get(path).cloned().map_or_else(|| self.read(files, path), Ok)?;
+                Ok((path.clone(), read))
             })
             .collect();
         // Of several errors the first file's, whichever was read first.
         let images: Images = read.into_iter().collect::<Result<_, FolderError>>()?;
         drop(known);
         let loaded: Vec<LoadedMap> =
-            (self.files.iter()).map(|(role, path)| self.loaded(*role, path, images[path].clone())).collect();
+            (self.files.iter()).map(|(role, path)| self.loaded(*role, path, &images[path])).collect();
         let place = |map: &MapChannel| Some((loaded.iter().position(|l| l.path == map.file)?, map.channel));
         let (occlusion, metallic) =
             (self.occlusion.as_ref().and_then(place), self.metallic.as_ref().and_then(place));
@@ -95,7 +118,7 @@ impl MaterialMaps {
             None => None,
             Some(source) => {
                 let normal = match &self.normal {
-                    Some(source) => normal_map(source, &images[&source.file], &mut notes)?,
+                    Some(source) => normal_map(source, &images[&source.file].image, &mut notes)?,
                     None => NormalMap::flat(),
                 };
                 let roughness = roughness_maps(source, &images, self.wrap)?;
@@ -107,32 +130,31 @@ impl MaterialMaps {
 }
 
 impl MaterialMaps {
-    /// Reads one of [`MaterialMaps::files`].
-    ///
-    /// # Errors
-    /// [`FolderError::Image`] where the file cannot be read.
-    pub fn read(&self, role: Role, path: &Path) -> Result<LoadedMap, FolderError> {
-        Ok(self.loaded(role, path, Arc::new(self.image(path)?)))
-    }
-
-    /// An image, read once.
-    pub(super) fn image_once(&self, images: &mut Images, path: &Path) -> Result<Arc<Image>, FolderError> {
-        if let Some(image) = images.get(path) {
-            return Ok(image.clone());
+    /// A file, read once.
+    pub(super) fn read_once(
+        &self,
+        files: &dyn Files,
+        images: &mut Images,
+        path: &Path,
+    ) -> Result<Arc<Image>, FolderError> {
+        if let Some(read) = images.get(path) {
+            return Ok(read.image.clone());
         }
-        let image = Arc::new(self.image(path)?);
-        images.insert(path.into(), image.clone());
+        let read = self.read(files, path)?;
+        let image = read.image.clone();
+        images.insert(path.into(), read);
         Ok(image)
     }
 
     /// An image: of an EXR file the layer that a flag names, colour encoded as a flag says.
-    fn image(&self, path: &Path) -> Result<Image, FolderError> {
+    fn read(&self, files: &dyn Files, path: &Path) -> Result<ReadImage, FolderError> {
+        let bytes = files.read(path).map_err(|e| kinran_image::Error::io(path, e))?;
         let layer = self.layers.iter().rev().find(|(file, _)| file == path).map(|(_, layer)| layer.as_str());
-        let mut image = read_layer(path, layer)?;
+        let mut image = decode_layer(path, &bytes, layer)?;
         if let Some(space) = self.color_space.filter(|_| self.color.as_deref() == Some(path)) {
             image.transfer = space;
         }
-        Ok(image)
+        Ok(ReadImage { image: Arc::new(image), blake3: blake3::hash(&bytes).to_hex().to_string() })
     }
 
     /// What the texels of maps of numbers say against them: numbers that no such map holds, and colour where grey is wanted.
@@ -140,17 +162,18 @@ impl MaterialMaps {
         let mut notes = Vec::new();
         for (what, map) in self.numbers() {
             let file = super::file_name(&map.file);
-            let outside = outside_unit(&images[&map.file], &[map.channel]);
+            let outside = outside_unit(&images[&map.file].image, &[map.channel]);
             notes.extend(outside.map(|outside| format!("{file}, its {what}: {outside}")));
             let is_alone = self.files.iter().any(|(role, path)| *path == map.file && !role.is_packed());
-            if let Some(colored) = colored(&images[&map.file]).filter(|_| is_alone && map.channel == 0) {
+            if let Some(colored) = colored(&images[&map.file].image).filter(|_| is_alone && map.channel == 0)
+            {
                 notes.push(format!(
                     "{file}: {colored}, though a map of {what} is grey; red is taken, name it with --map ROLE={file} if it \
                      holds something else"
                 ));
             }
         }
-        if let Some(file) = self.vectors().filter(|file| is_signed(&images[*file])) {
+        if let Some(file) = self.vectors().filter(|file| is_signed(&images[*file].image)) {
             notes.push(format!(
                 "{}: it holds negative numbers, so red and green are taken as -1 to 1, not as 0 to 1",
                 super::file_name(file)
@@ -159,7 +182,7 @@ impl MaterialMaps {
         let wholes = [(&self.color, "colour", 4), (&self.encoded(), "aniso texels", 3)];
         for (file, what, channels) in wholes {
             let Some(file) = file else { continue };
-            let outside = outside_unit(&images[file], &[0, 1, 2, 3][..channels]);
+            let outside = outside_unit(&images[file].image, &[0, 1, 2, 3][..channels]);
             notes.extend(outside.map(|outside| format!("{}, its {what}: {outside}", super::file_name(file))));
         }
         notes
@@ -218,7 +241,8 @@ impl MaterialMaps {
         }
     }
 
-    fn loaded(&self, role: Role, path: &Path, image: Arc<Image>) -> LoadedMap {
+    fn loaded(&self, role: Role, path: &Path, read: &ReadImage) -> LoadedMap {
+        let image = read.image.clone();
         let mut remarks = image.notes.clone();
         let space = if image.transfer == Transfer::Linear { "linear" } else { "sRGB" };
         match (role, image.transfer) {
@@ -241,7 +265,7 @@ impl MaterialMaps {
         if !reads_alpha && has_alpha(&image) {
             remarks.push("its alpha is not 1 everywhere and is not read".into());
         }
-        LoadedMap { role, path: path.into(), image, remarks }
+        LoadedMap { role, path: path.into(), blake3: read.blake3.clone(), image, remarks }
     }
 }
 
@@ -318,7 +342,7 @@ fn normal_map(
 
 /// One channel of a map as it is.
 fn channel(images: &Images, map: &MapChannel) -> Result<ScalarMap, FolderError> {
-    let image = &images[&map.file];
+    let image = &images[&map.file].image;
     let count = image.channels.count();
     let lacks = if map.channel < 3 { map.channel > 0 && count < 3 } else { count % 2 == 1 };
     if lacks {
@@ -352,7 +376,7 @@ fn second_channel(image: &Image) -> Result<Image, FolderError> {
 }
 
 fn grey_file(images: &Images, file: &Path) -> ScalarMap {
-    ScalarMap::channel(images[file].clone(), 0)
+    ScalarMap::channel(images[file].image.clone(), 0)
 }
 
 fn roughness_maps(
@@ -383,7 +407,7 @@ fn roughness_maps(
             RoughnessMaps::Gloss { u, v, direction: direction_map(direction.as_ref(), images)? }
         }
         RoughnessSource::Khr { base, texture } => {
-            let image = &unsigned(&images[texture]);
+            let image = &unsigned(&images[texture].image);
             if is_grey(image) {
                 return Err(unfit(
                     texture,
@@ -412,14 +436,14 @@ fn roughness_maps(
             }
         }
         RoughnessSource::Encoded(file) => {
-            if is_grey(&images[file]) {
+            if is_grey(&images[file].image) {
                 return Err(unfit(
                     file,
                     "it is grey, but an aniso map has three different channels",
                     format!("say what it is with --map ROLE=FILE, or --ignore {}", super::file_name(file)),
                 ));
             }
-            RoughnessMaps::Encoded(images[file].clone())
+            RoughnessMaps::Encoded(images[file].image.clone())
         }
     })
 }
@@ -430,7 +454,7 @@ fn direction_map(
     images: &Images,
 ) -> Result<Option<DirectionMap>, FolderError> {
     let Some(source) = source else { return Ok(None) };
-    let image = &images[&source.file];
+    let image = &images[&source.file].image;
     Ok(Some(match (is_grey(image), source.span) {
         (true, Some(span)) => DirectionMap::Angle { map: ScalarMap::channel(image.clone(), 0), span },
         (true, None) => {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use kinran_image::Image;
+use kinran_image::{Disk, Files, Image};
 
 use super::evidence::{apart, green_correlation, guess_by_correlation};
 use super::load::Images;
@@ -30,19 +30,20 @@ impl MaterialMaps {
     /// [`FolderError::Ambiguous`] where they do not, [`FolderError::Image`] where one cannot be read.
     pub fn compare_twins(&self) -> Result<Vec<String>, FolderError> {
         let mut notes = Vec::new();
-        self.settled(&mut Images::new(), &mut notes)?;
+        self.settled(&Disk, &mut Images::new(), &mut notes)?;
         Ok(notes)
     }
 
     /// The maps after a look at the texels of twins, which are read into `images`.
     pub(super) fn settled(
         &self,
+        files: &dyn Files,
         images: &mut Images,
         notes: &mut Vec<String>,
     ) -> Result<MaterialMaps, FolderError> {
         let mut maps = self.clone();
         for twin in &self.twins {
-            let [used, other] = [&twin.used, &twin.other].map(|file| self.image_once(images, file));
+            let [used, other] = [&twin.used, &twin.other].map(|file| self.read_once(files, images, file));
             let (used, other) = (used?, other?);
             if twin.role == Role::Normal {
                 self.settle_normals(twin, [&used, &other], &mut maps, notes)?;

@@ -1,6 +1,12 @@
 //! What each flag of `kinran bake` acts on. A flag that cannot act is refused by its name, and never swallowed.
 
-use super::{Args, Container, Edges, KernelName, MethodName, Which};
+use kinran::bake::Which;
+use kinran::options::Container;
+use kinran_bake::aniso::Kernel;
+use kinran_bake::curvature::Method;
+use kinran_scene::Wrap;
+
+use super::Args;
 
 /// What a flag acts on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,8 +44,8 @@ const fn flag(name: &'static str, on: On, given: fn(&Args) -> bool) -> Flag {
 pub(super) const FLAGS: [Flag; 41] = [
     flag("output", On::Run, |a| a.output.is_some()),
     flag("filter", On::Any, |a| a.filter.name() != "ml"),
-    flag("kernel", On::Any, |a| a.kernel != KernelName::default()),
-    flag("edges", On::Folder, |a| a.edges != Edges::default()),
+    flag("kernel", On::Any, |a| a.kernel != Kernel::default()),
+    flag("edges", On::Folder, |a| a.edges != Wrap::Repeat),
     flag("form", On::Any, |a| a.form.is_some()),
     flag("container", On::Any, |a| a.container != Container::default()),
     flag("zstd", On::Any, |a| a.zstd != 3),
@@ -66,7 +72,7 @@ pub(super) const FLAGS: [Flag; 41] = [
     flag("allow-outside", On::Model, |a| !a.model.allow_outside.is_empty()),
     flag("skin", On::Model, |a| !a.curvature.skin.is_empty()),
     flag("curvature", On::Model, |a| a.curvature.curvature != Which::default()),
-    flag("curvature-method", On::Curvature, |a| a.curvature.curvature_method != MethodName::default()),
+    flag("curvature-method", On::Curvature, |a| a.curvature.curvature_method != Method::default()),
     flag("curvature-range", On::Curvature, |a| a.curvature.curvature_range.is_some()),
     flag("curvature-blur", On::Curvature, |a| a.curvature.curvature_blur.is_some()),
     flag("unit-mm", On::Curvature, |a| a.curvature.unit_mm.is_some()),

@@ -11,6 +11,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
+use kinran::Space;
+use kinran::report::Report;
 use kinran_bake::cache::{Cache, Entry, Key, StoredFile, WorkFolder, hash_file, relative};
 use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError};
 use kinran_bake::stamps::{Stamp, Stamps};
@@ -23,9 +25,9 @@ use serde::{Deserialize, Serialize};
 use self::inputs::{Snapshot, Sources};
 use self::ours::Ours;
 use super::settings::{self, Flags};
-use super::{Args, Report, bake_folder, bake_gltf, file_name, folder, gltf};
+use super::{Args, file_name, folder, gltf};
 use crate::detail::{self, SolveArgs, solve_target};
-use crate::outputs::{Space, check_space};
+use crate::outputs::{check_space, space_text};
 use crate::skin_lut;
 use crate::table::list;
 use crate::values::counted;
@@ -174,7 +176,7 @@ impl LibraryReport {
             .collect();
         text += &format!("{}; in {}\n", counts.join(", "), self.output.display());
         if self.entries.iter().any(planned) {
-            text += &format!("the files will take {}\n", self.space.text());
+            text += &format!("the files will take {}\n", space_text(self.space));
         }
         let named = |folders: &[PathBuf]| {
             let names: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
@@ -776,8 +778,10 @@ fn bake_into(output: &Path, job: &Job, snapshot: &Snapshot, bars: &Progress) -> 
         Flags::Bake(flags) => {
             let flags = Args { input, output: Some(output), is_copy: true, ..(**flags).clone() };
             match job.kind {
-                Kind::Mesh => bake_gltf(&flags, &silent).map(|report| of(vec![report])),
-                _ => bake_folder(&flags, &silent).map(of),
+                Kind::Mesh => gltf::bake_gltf(&flags, &silent).map(|report| of(vec![report])),
+                _ => folder::understand(&flags)
+                    .and_then(|understood| folder::bake_folder(&flags, &understood, &silent))
+                    .map(of),
             }
         }
         Flags::Detail(flags) => {

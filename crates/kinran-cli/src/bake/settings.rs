@@ -70,11 +70,14 @@ impl Flags {
     /// How textures may be compressed.
     pub(super) fn encodings(&self) -> Vec<Encoding> {
         match self {
-            Flags::Bake(args) => vec![
-                args.encoding(Role::Normal, args.normal_format),
-                args.encoding(Role::Aniso, args.aniso_format),
-                args.encoding(Role::Color, args.color_format),
-            ],
+            Flags::Bake(args) => {
+                let how = args.textures();
+                vec![
+                    how.encoding(Role::Normal, args.normal_format),
+                    how.encoding(Role::Aniso, args.aniso_format),
+                    how.encoding(Role::Color, args.color_format),
+                ]
+            }
             Flags::Detail(args) => {
                 let format = args.format.unwrap_or_else(|| default_format(args.kind()));
                 let masks = args.layer.iter().any(|layer| layer.mask.is_some()).then_some(BlockFormat::Bc7);
@@ -141,7 +144,7 @@ pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestErr
         return Ok(Flags::Skin(Box::new(args)));
     }
     let mut args = BakeFlags::try_parse_from(all).map_err(wrong)?.args;
-    super::check_formats(&args).map_err(|e| manifest.error(&job.place, e.to_string()))?;
+    (args.textures().check()).map_err(|e| manifest.error(&job.place, Error::from(e).to_string()))?;
     args.model.allow_outside.iter_mut().for_each(|folder| *folder = manifest.beside(&*folder));
     let maps = args.map.iter_mut().map(|(_, path)| path);
     let layers = args.exr_layer.iter_mut().map(|(path, _)| path);

@@ -4,13 +4,18 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use glam::vec3;
+use kinran::content::Content;
+use kinran::options::Container;
+use kinran::report::{WrittenFile, kept_files};
+use kinran::{OutputFolder, Space};
 use kinran_bake::detail::{
     Comparison, DetailOptions, FADE_TRIALS, Layer, LayerTransform, LevelError, MapKind, Mask, Resolution,
     Solved, Target, Tile, TileOptions, bearable_opacity, compare, level_pictures, lowest_resolution, solve,
 };
 use kinran_bake::folder::{Green, guess_green, not_normals};
 use kinran_image::{
-    Image, encode_dds, encode_ktx2, encode_png, image_size, read_layer, read_texture, write_atomically,
+    Image, Preset, encode_dds, encode_ktx2, encode_png, image_size, read_layer, read_texture,
+    write_atomically,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -18,15 +23,13 @@ use serde::Serialize;
 use super::layer_flag::{green_by_name, layer_flag};
 use super::model::{self, Written, channels_flag};
 use super::{BlockFormat, KindName, KindSource, LayerFlag, default_format};
-use crate::bake::{Container, PresetName};
-use crate::content::Content;
 use crate::model::ModelArgs;
 use crate::outputs::{
-    Space, WrittenFile, beside, bytes_text, changed_files, check_folder, check_space, has_extension,
-    kept_files, kept_remark, refuse_foreign, refuse_input, replaced_bytes, tell_place,
+    beside, bytes_text, changed_files, check_folder, check_space, has_extension, kept_remark, refuse_foreign,
+    refuse_input, replaced_bytes, tell_place, written_file,
 };
 use crate::table::table;
-use crate::values::{exr_layer, exr_layer_of, number};
+use crate::values::{CONTAINERS, PRESETS, choice, exr_layer, exr_layer_of, number};
 use crate::{Console, Error, Stage};
 
 /// Solves one target: writes NAME_synthesized, its tiles as they were compressed, and NAME.detail.json
@@ -77,8 +80,8 @@ pub struct SolveArgs {
     pub tile_format: Option<BlockFormat>,
 
     /// Time spent on a block of the synthesized map
-    #[arg(long, value_enum)]
-    pub preset: Option<PresetName>,
+    #[arg(long, value_parser = choice(PRESETS))]
+    pub preset: Option<Preset>,
 
     /// Opacity of the detail over an aniso target: the shader's parameter
     #[arg(long, value_name = "0..1", default_value_t = ALPHA, value_parser = |t: &str| number(t, 0.0..=1.0))]
@@ -161,7 +164,7 @@ pub struct SolveArgs {
     pub force: bool,
 
     /// File format of the textures
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, default_value = "ktx2", value_parser = choice(CONTAINERS))]
     pub container: Container,
 
     /// Zstandard level of KTX2 files, 0 for none
@@ -351,7 +354,7 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     let format = args.format.unwrap_or_else(|| default_format(kind));
     let mut options = DetailOptions::new(format.encoding());
     if let Some(preset) = args.preset {
-        options.encoding.preset = preset.into();
+        options.encoding.preset = preset;
     }
     options.aniso_alpha = args.alpha;
     options.compensate = !args.no_compensation;
@@ -487,9 +490,9 @@ pub fn solve_target(args: &SolveArgs, console: &Console) -> Result<SolveReport, 
     }
     let first = &solved.texture.levels[0];
     let written =
-        files.iter().map(|file| WrittenFile::of(&args.output(), file)).collect::<Result<Vec<_>, _>>()?;
+        files.iter().map(|file| written_file(&args.output(), file)).collect::<Result<Vec<_>, _>>()?;
     let report_file = format!("{stem}.detail.json");
-    let kept = kept_files(&args.output(), &report_file, &written);
+    let kept = kept_files(&OutputFolder::new(args.output()), &report_file, &written);
     let report = SolveReport {
         target: file_name(&args.target),
         kind: kind_name,

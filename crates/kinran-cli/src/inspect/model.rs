@@ -9,13 +9,13 @@ use kinran_scene::{Document, LightKind, Material, Needs, Scene, TextureRef};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::bake::{format_name, texel_remarks};
 use crate::model::{ModelArgs, read_scene};
 use crate::render::triangles;
 use crate::table::list;
 use crate::values::counted;
 use crate::view::file_name;
 use crate::{Console, Error, outputs};
+use kinran::bake::texel_remarks;
 
 #[derive(Serialize, JsonSchema)]
 pub(crate) struct Report {
@@ -152,7 +152,7 @@ fn maps(scene: &Scene, document: Option<&Document>, m: &Material) -> Vec<MapRepo
         let uri = document.and_then(|d| d.json().get("images")?.get(image)?.get("uri")?.as_str());
         Some(RuntimeReport {
             file: uri.map(|uri| if uri.starts_with("data:") { "data:".into() } else { uri.to_owned() }),
-            format: format_name(texture.format).into(),
+            format: texture.format.name().into(),
             levels: texture.levels.len(),
             filter: texture.metadata.get("KinranFilter").cloned(),
         })

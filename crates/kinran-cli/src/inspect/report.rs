@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
+use kinran::report::WrittenFile;
 use kinran_bake::cache::relative;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::outputs::{WrittenFile, bytes_text};
+use crate::outputs::{bytes_text, written_file};
 use crate::table::list;
 use crate::values::counted;
 use crate::view::file_name;
@@ -101,7 +102,7 @@ pub(super) fn inspect(path: &Path, console: &Console) -> Result<(), Error> {
 fn check(folder: &Path, file: WrittenFile) -> Checked {
     // A name that leads elsewhere is none of a file that was written beside the report.
     let inside = relative(&file.file).is_some();
-    let state = match WrittenFile::of(folder, file.file.as_str()) {
+    let state = match written_file(folder, file.file.as_str()) {
         Ok(now) if inside && now == file => State::AsWritten,
         Ok(_) if inside => State::Changed,
         _ => State::Missing,

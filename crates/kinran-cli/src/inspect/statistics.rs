@@ -5,7 +5,7 @@ use kinran_shading::{aniso_decode_matrix, normal_from_xy};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::content::Content;
+use kinran::content::Content;
 
 /// The smallest, the average and the largest value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]

@@ -8,12 +8,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::statistics::Statistics;
-use crate::content::Content;
 use crate::outputs::bytes_text;
 use crate::table::{list, table};
 use crate::values::counted;
 use crate::view::file_name;
 use crate::{Console, Error};
+use kinran::content::Content;
 
 #[derive(Serialize, JsonSchema)]
 pub(crate) struct Report {

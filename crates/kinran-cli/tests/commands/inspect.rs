@@ -177,7 +177,7 @@ fn a_file_that_kinran_writes_is_refused_by_inspect() {
         }
     }
     let all: std::collections::BTreeSet<String> =
-        kinran_cli::content::Content::ALL.into_iter().map(|content| content.name().to_owned()).collect();
+        kinran::content::Content::ALL.into_iter().map(|content| content.name().to_owned()).collect();
     let missing: Vec<&String> = all.difference(&roles).filter(|role| *role != "data").collect();
     assert!(missing.is_empty(), "no run wrote {missing:?}");
 }
@@ -207,4 +207,33 @@ fn a_report_hides_that_its_files_have_changed() {
     let other = folder.path().join("other.json");
     std::fs::write(&other, "{ \"a\": 1 }").unwrap();
     crate::common::refused(&["inspect", text(&other)], &["other.json", "no JSON that kinran writes"]);
+}
+
+#[test]
+fn a_baked_texture_that_was_cut_passes_the_check() {
+    let (folder, model) = square();
+    let baked = folder.path().join("baked");
+    assert_eq!(kinran(&["bake", text(&model), "-o", text(&baked)]).code, Some(0));
+    let files: Vec<String> = crate::common::files(&baked);
+    for file in &files {
+        let path = baked.join(file);
+        if ["ktx2", "glb", "json"].iter().any(|end| file.ends_with(end)) {
+            let said = kinran(&["inspect", "--check", text(&path)]);
+            assert_eq!((said.code, said.out), (Some(0), format!("{file}: all is well\n")), "{}", said.err);
+        }
+    }
+    let texture = baked.join(files.iter().find(|file| file.ends_with(".ktx2")).unwrap());
+    let bytes = std::fs::read(&texture).unwrap();
+    std::fs::write(&texture, &bytes[..bytes.len() / 2]).unwrap();
+    let said = kinran(&["inspect", "--check", "--json", text(&texture)]);
+    assert_eq!(said.code, Some(2), "{}", said.err);
+    let report: serde_json::Value = serde_json::from_str(&said.out).unwrap();
+    assert_eq!(
+        (&report["kind"], report["findings"].as_array().map(Vec::len)),
+        (&"check".into(), Some(1)),
+        "{report}"
+    );
+    let other = baked.join("notes.txt");
+    std::fs::write(&other, "").unwrap();
+    crate::common::refused(&["inspect", "--check", text(&other)], &["notes.txt", "nothing that is checked"]);
 }

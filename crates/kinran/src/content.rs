@@ -2,8 +2,6 @@
 
 use std::borrow::Cow;
 
-use clap::ValueEnum;
-use clap::builder::PossibleValue;
 use kinran_bake::aniso::Sheet;
 use kinran_image::{Format, Texture, Transfer};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -108,16 +106,6 @@ impl From<Sheet> for Content {
             Sheet::Roughness | Sheet::IsotropicRoughness => Content::Roughness,
             Sheet::KhrAnisotropy => Content::Anisotropy,
         }
-    }
-}
-
-impl ValueEnum for Content {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Content::ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name()))
     }
 }
 

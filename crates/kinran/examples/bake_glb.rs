@@ -1,0 +1,25 @@
+//! Bakes a `.glb` from bytes to bytes: `cargo run --example bake_glb -- lamp.glb baked/`. Enter stops it.
+
+use std::path::Path;
+
+use kinran::bake::{GltfOptions, gltf};
+use kinran::{Cancel, Error, Memory, Progress, Task};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let [model, folder] = [1, 2].map(|i| std::env::args().nth(i).unwrap_or_default());
+    let (files, out) = (Memory::from([("model.glb", std::fs::read(model)?)]), Memory::new());
+    static CANCEL: Cancel = Cancel::new();
+    std::thread::spawn(|| std::io::stdin().read_line(&mut String::new()).map(|_| CANCEL.cancel()));
+    let tell = |p: Progress<'_>| eprintln!("{p}: {} of {}", p.done, p.total);
+    let mut how = GltfOptions::default();
+    how.all_textures = true;
+    match gltf(&files, Path::new("model.glb"), &how, &out, Task { tell: &tell, cancel: &CANCEL }) {
+        Ok(report) => report.warnings.iter().for_each(|warning| eprintln!("warning: {warning}")),
+        Err(Error::Cancelled) => return Ok(()),
+        Err(error) => return Err(format!("{}: {error}", error.code()).into()),
+    }
+    for (name, bytes) in out.files() {
+        std::fs::write(Path::new(&folder).join(name), bytes)?;
+    }
+    Ok(())
+}

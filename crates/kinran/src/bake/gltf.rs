@@ -1,0 +1,909 @@
+//! A glTF file: its materials' textures are replaced by baked ones, everything else stays.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use kinran_bake::aniso::{RoughnessMaps, Sheet, SheetRequest, bake_surface};
+use kinran_bake::folder::{Green, GreenGuess, below_surface, guess_green, odd_lengths, outside_unit};
+use kinran_bake::{MaterialSurface, NoSurface, bake_plain, material_surface};
+use kinran_image::{
+    Channels, Encoder, Encoding, Files, Format, Image, Memory, Pixels, Preset, Role, Texture, Transfer,
+    decode_image, encode_png, image_size_of,
+};
+use kinran_scene::{
+    Document, FUZZ_EXTENSION, Maps, Material, Needs, Scene, Slot, TextureExtension, TextureRef,
+};
+use serde_json::Value;
+
+use super::{CurvatureOptions, curvature, file_name, file_stem, mip_texels, put_texture};
+use crate::content::Content;
+use crate::options::{Form, TextureOptions};
+use crate::report::{Input, Output, Report, SurfaceReport, WrittenFile};
+use crate::{Error, Sink, Space, Stage, Task};
+
+/// How a glTF file is baked.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct GltfOptions {
+    /// How textures are filtered, compressed and stored.
+    pub textures: TextureOptions,
+    /// Which maps hold the lobe; glTF's own are always written. [`Form::Khr`] by default.
+    pub form: Form,
+    /// Whether base colour, emission and occlusion are baked too.
+    pub all_textures: bool,
+    /// Which way green points in normal maps, where they are not as glTF wants them; they are turned over where it points
+    /// down.
+    pub green: Option<Green>,
+    /// Folders whose files the model may name besides those of its own.
+    pub allow_outside: Vec<PathBuf>,
+    /// Materials that become skin, by name, or "all".
+    pub skin: Vec<String>,
+    /// How curvature is measured.
+    pub curvature: CurvatureOptions,
+    /// Whether meshes that have no normals get smooth ones.
+    pub estimate_normals: bool,
+    /// What the report names as its source: the way from the output to the model, `/`-separated.
+    pub source: Option<String>,
+}
+
+impl Default for GltfOptions {
+    fn default() -> Self {
+        GltfOptions {
+            textures: TextureOptions::default(),
+            form: Form::Khr,
+            all_textures: false,
+            green: None,
+            allow_outside: Vec::new(),
+            skin: Vec::new(),
+            curvature: CurvatureOptions::default(),
+            estimate_normals: false,
+            source: None,
+        }
+    }
+}
+
+/// A model, and what of it can be baked.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Understood {
+    /// What it shows, its skin marked and its normals estimated where that was asked for.
+    pub scene: Scene,
+    /// The document, changed in the same way.
+    pub document: Document,
+    /// Each surface that will be filtered.
+    pub surfaces: Vec<Surface>,
+    /// What was left out or assumed, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// The normals and the lobe of materials that share them.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Surface {
+    /// The materials, by their numbers in the document.
+    pub materials: Vec<usize>,
+    /// Their maps.
+    pub maps: MaterialSurface,
+    key: Key,
+}
+
+impl Understood {
+    /// The maps that a surface is made of.
+    ///
+    /// # Errors
+    /// Where an image cannot be read.
+    pub fn inputs(&self, surface: &Surface) -> Result<Vec<Input>, Error> {
+        inputs(&self.scene, &self.document, surface.materials[0])
+    }
+}
+
+/// Reads a model and finds out what of it can be baked.
+///
+/// # Errors
+/// Those of [`Scene::load`]; a material of [`GltfOptions::skin`] that is not there.
+pub fn understand_gltf(
+    files: &dyn Files,
+    input: &Path,
+    how: &GltfOptions,
+    task: Task<'_>,
+) -> Result<Understood, Error> {
+    let mut document = Document::open_in(files, input, &how.allow_outside)?;
+    let (smoothed, mut files) = (Memory::new(), files);
+    if how.estimate_normals && curvature::add_normals(&mut document, files, how, task)? {
+        for (path, bytes) in document.pack_in_memory(input)?.files {
+            smoothed.insert(path, bytes);
+        }
+        files = &smoothed;
+        document = Document::open_in(files, input, &[])?;
+    }
+    let needs = Needs {
+        geometry: how.asks(&document),
+        rest_pose: true,
+        maps: if how.all_textures { Maps::Plain } else { Maps::Surface },
+    };
+    let reading = task.begin(Stage::Reading, file_name(input), 0)?;
+    let expect = |units| reading.expect(units);
+    let mut scene =
+        Scene::load_in(files, input, &how.allow_outside, &needs, &expect, &|units| reading.tick(units))?;
+    drop(reading);
+    if needs.geometry && document.decompress()? {
+        scene.warnings.push(
+            "its meshes were compressed by Draco or meshopt; they are written plain, since curvature is added to them"
+                .into(),
+        );
+    }
+    curvature::mark_skin(&how.skin, &mut scene, &mut document)?;
+    let (surfaces, warnings) = surfaces(input, how, &scene, &document);
+    Ok(Understood { scene, document, surfaces, warnings })
+}
+
+/// Bakes every material of a glTF file that has a normal, a roughness or an anisotropy map, and writes the model beside its
+/// textures.
+///
+/// Each baked texture keeps a PNG or JPEG of level 0 as the fallback that glTF wants: the original image, or,
+/// where a factor was baked in, a new one.
+///
+/// # Errors
+/// Whatever is wrong with the model, the options or the destination. Files that were written before are whole and stay.
+pub fn gltf(
+    files: &dyn Files,
+    input: &Path,
+    how: &GltfOptions,
+    out: &dyn Sink,
+    task: Task<'_>,
+) -> Result<Report, Error> {
+    how.textures.check()?;
+    let model = file_name(input);
+    let there = out.place(&model).and_then(|place| place.canonicalize().ok());
+    if there.is_some() && files.place(input) == there {
+        return Err(Error::OverInput { input: input.into() });
+    }
+    let Understood { scene, mut document, surfaces, warnings } = understand_gltf(files, input, how, task)?;
+    let mut report = Report { warnings, source: how.source.clone(), ..Report::new(&how.textures) };
+    let stem = input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    let plan = Plan::new(how, &scene, &document, &surfaces, &stem);
+    check(input, how, &scene, &document, &surfaces, &plan, out)?;
+
+    let mut written = Vec::new();
+    for (surface, (name, planned)) in surfaces.iter().zip(&plan.surfaces) {
+        let (scene, document, name, written) = (&scene, &mut document, name.clone(), &mut written);
+        let mut baker = SurfaceBaker { how, scene, document, name, written, out, task };
+        report.surfaces.push(baker.bake(surface, planned)?);
+    }
+    for turned in &plan.turned {
+        turn_green(input, &mut document, turned, &mut written, out)?;
+    }
+    bake_colors(how, &scene, &mut document, &plan.colors, &mut report, out, task)?;
+    let dumps = curvature::bake(input, how, &scene, &mut document, &mut report, out, task)?;
+
+    for (i, material) in scene.materials.iter().enumerate().take(document.material_count()) {
+        let extensions = document.material(i).get("extensions");
+        let has = |name| extensions.is_some_and(|e| e.get(name).is_some());
+        if let (Some(fuzz), true, false) = (&material.fuzz, has(FUZZ_EXTENSION), has("KHR_materials_sheen")) {
+            // What viewers show that know nothing of fuzz.
+            fuzz.write(document.material_mut(i));
+            document.use_extension("KHR_materials_sheen", false);
+        }
+    }
+    let _writing = task.begin(Stage::Writing, &model, 0)?;
+    let (packed, packing) = pack(&document, &model, out)?;
+    report.warnings.extend(packing);
+    written.extend(dumps);
+    for (name, bytes) in packed {
+        out.put(&name, &bytes)?;
+        written.push(WrittenFile::new(name, &bytes));
+    }
+    report.write(out, &format!("{stem}.kinran.json"), written)?;
+    Ok(report)
+}
+
+/// The document and the files that it takes along, by name, the document last; and what could not be cleaned up.
+fn pack(
+    document: &Document,
+    model: &str,
+    out: &dyn Sink,
+) -> Result<(Vec<(String, Vec<u8>)>, Vec<String>), Error> {
+    let (packed, folder) = match out.place(model) {
+        Some(place) => (document.pack(&place)?, place.parent().map(Path::to_path_buf).unwrap_or_default()),
+        None => (document.pack_in_memory(model)?, PathBuf::new()),
+    };
+    let name = |path: &Path| {
+        let path = path.strip_prefix(&folder).unwrap_or(path);
+        path.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
+    };
+    let files = packed.files.into_iter().map(|(path, bytes)| (name(&path), bytes)).collect();
+    Ok((files, packed.warnings))
+}
+
+/// The textures that will be baked, before any is.
+struct Plan {
+    /// What the files of each surface are called, and which they are.
+    surfaces: Vec<(String, Vec<Planned>)>,
+    colors: Vec<Colored>,
+    turned: Vec<Turned>,
+}
+
+/// A normal map that is not filtered, and whose green is turned over.
+struct Turned {
+    /// The new file.
+    file: String,
+    texture: usize,
+    image: usize,
+    /// The materials that use it, and where.
+    slots: Vec<(usize, Slot)>,
+}
+
+/// An image that needs no filter of its own.
+struct Colored {
+    /// What its files are called.
+    name: String,
+    place: TextureRef,
+    transfer: Transfer,
+    /// The materials that use it, and where.
+    slots: Vec<(usize, Slot)>,
+}
+
+impl Colored {
+    fn content(&self) -> Content {
+        match self.transfer {
+            Transfer::Srgb => Content::Color,
+            Transfer::Linear | Transfer::Unsaid => Content::Data,
+        }
+    }
+
+    fn encoding(&self, how: &TextureOptions) -> Encoding {
+        let role = if self.transfer == Transfer::Srgb { Role::Color } else { Role::Data };
+        how.encoding(role, how.color_format)
+    }
+}
+
+impl Plan {
+    fn new(how: &GltfOptions, scene: &Scene, document: &Document, all: &[Surface], stem: &str) -> Self {
+        let mut names = Names::default();
+        let surfaces = all.iter().map(|surface| {
+            let material = &scene.materials[surface.materials[0]];
+            let name = names.unique(&format!("{stem}_{}", file_stem(&material.name)));
+            (name, planned(scene, material, &surface.maps))
+        });
+        let surfaces = surfaces.collect();
+        let mut colors: Vec<Colored> = Vec::new();
+        let materials = document.material_count().min(scene.materials.len());
+        for material in (0..materials).filter(|_| how.all_textures) {
+            let m = &scene.materials[material];
+            let occlusion = m.occlusion.as_ref().filter(|_| !occlusion_is_packed(scene, material));
+            for (slot, place, transfer) in [
+                (Slot::BaseColor, m.base_color.as_ref(), Transfer::Srgb),
+                (Slot::Emissive, m.emissive.as_ref(), Transfer::Srgb),
+                (Slot::Occlusion, occlusion, Transfer::Linear),
+            ] {
+                let Some(place) = place.filter(|place| scene.images[place.image].is_some()) else { continue };
+                let known = colors.iter_mut().find(|c| c.place == *place && c.transfer == transfer);
+                match known {
+                    Some(known) => known.slots.push((material, slot)),
+                    None => {
+                        let mut color = Colored {
+                            name: String::new(),
+                            place: place.clone(),
+                            transfer,
+                            slots: vec![(material, slot)],
+                        };
+                        let image = file_stem(&document.image_name(place.image));
+                        color.name = names.unique(&format!("{stem}_{image}_{}", color.content().name()));
+                        colors.push(color);
+                    }
+                }
+            }
+        }
+        let baked: Vec<usize> = all.iter().flat_map(|surface| surface.materials.clone()).collect();
+        let mut turned: Vec<Turned> = Vec::new();
+        for material in (0..materials).filter(|_| how.green == Some(Green::Down)) {
+            // The maps of a surface are turned while they are filtered.
+            let slots = [Slot::Normal, Slot::ClearcoatNormal].into_iter();
+            for slot in slots.filter(|slot| *slot != Slot::Normal || !baked.contains(&material)) {
+                let Some(texture) = document.texture(material, slot) else { continue };
+                let Some(image) = document.texture_image(texture) else { continue };
+                if let Some(known) = turned.iter_mut().find(|known| known.texture == texture) {
+                    known.slots.push((material, slot));
+                    continue;
+                }
+                let name = names.unique(&format!("{stem}_{}_up", file_stem(&document.image_name(image))));
+                turned.push(Turned {
+                    file: format!("{name}.png"),
+                    texture,
+                    image,
+                    slots: vec![(material, slot)],
+                });
+            }
+        }
+        Plan { surfaces, colors, turned }
+    }
+}
+
+/// Writes a normal map with its green turned over and puts it into its slots.
+fn turn_green(
+    input: &Path,
+    document: &mut Document,
+    turned: &Turned,
+    written: &mut Vec<WrittenFile>,
+    out: &dyn Sink,
+) -> Result<(), Error> {
+    let name = document.image_name(turned.image);
+    let bytes = document.image_bytes(turned.image)?.into_owned();
+    let mut image = decode_image(Path::new(&name), &bytes)
+        .map_err(|error| Error::Unturned { input: input.into(), error })?;
+    let count = image.channels.count();
+    fn turn<T: Copy>(samples: &mut [T], count: usize, over: impl Fn(T) -> T) {
+        samples.iter_mut().skip(1).step_by(count).for_each(|green| *green = over(*green));
+    }
+    match &mut image.pixels {
+        _ if image.channels < Channels::Rgb => {}
+        Pixels::U8(samples) => turn(samples, count, |g| 255 - g),
+        Pixels::U16(samples) => turn(samples, count, |g| 65535 - g),
+        Pixels::F32(samples) => turn(samples, count, |g| 1.0 - g),
+    }
+    let bytes = encode_png(&image)?;
+    out.put(&turned.file, &bytes)?;
+    written.push(WrittenFile::new(&turned.file, &bytes));
+    let source = document.add_image_file(&turned.file);
+    let texture = document.add_texture(Some(turned.texture), Some(source), &[]);
+    for &(material, slot) in &turned.slots {
+        document.set_texture(material, slot, texture);
+    }
+    Ok(())
+}
+
+/// The sheets of a material's surface.
+fn planned(scene: &Scene, m: &Material, surface: &MaterialSurface) -> Vec<Planned> {
+    let has_image = m.metallic_roughness.as_ref().is_some_and(|place| scene.images[place.image].is_some());
+    let directed = matches!(surface.maps.roughness, RoughnessMaps::Khr { .. });
+    // Factors are baked into the textures; an image that showed level 0 without them is replaced.
+    let mut planned = Vec::new();
+    if m.normal.is_some() {
+        let changed = m.normal_scale != 1.0 || surface.maps.normal.y_down;
+        planned.push(Planned { sheet: Sheet::Normal, slot: Slot::Normal, changed });
+    }
+    planned.push(Planned {
+        sheet: if directed { Sheet::Roughness } else { Sheet::IsotropicRoughness },
+        slot: Slot::MetallicRoughness,
+        changed: m.roughness_factor != 1.0 || !has_image,
+    });
+    if let Some(a) = m.anisotropy.as_ref().filter(|_| directed) {
+        planned.push(Planned {
+            sheet: Sheet::KhrAnisotropy,
+            slot: Slot::Anisotropy,
+            changed: a.strength != 1.0 || a.rotation != 0.0 || a.texture.is_none(),
+        });
+    }
+    planned
+}
+
+/// Bytes that a model's files will take, by the headers of its images alone: a library asks for thousands.
+///
+/// # Errors
+/// Where the document cannot be read.
+pub fn gltf_space(files: &dyn Files, input: &Path, how: &GltfOptions) -> Result<Space, Error> {
+    let document = Document::open_in(files, input, &how.allow_outside)?;
+    let image = |material: usize, slot: Slot| document.texture_image(document.texture(material, slot)?);
+    let size = |image: &usize| image_size_of(&document.image_bytes(*image).ok()?);
+    let options = &how.textures;
+    let texture = |sheet: Sheet, size: (u32, u32)| options.space(options.of_sheet(sheet).format, size);
+    let mut space = Space::default();
+    // Materials that share their maps share their textures.
+    let (mut surfaces, mut plain) = (BTreeSet::new(), BTreeSet::new());
+    for material in 0..document.material_count() {
+        let maps = SURFACE_SLOTS.map(|slot| image(material, slot));
+        let extensions = document.material(material).get("extensions");
+        let directed = extensions.is_some_and(|e| e.get("KHR_materials_anisotropy").is_some());
+        let is_baked = maps[0].is_some() || (directed && maps.iter().any(Option::is_some));
+        if is_baked
+            && surfaces.insert(maps)
+            && let Some(size) =
+                maps.iter().flatten().filter_map(size).reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)))
+        {
+            let sheets = [
+                (maps[0].is_some(), Sheet::Normal),
+                (true, Sheet::Roughness),
+                (directed, Sheet::KhrAnisotropy),
+                (how.form.aniso(), Sheet::Aniso),
+            ];
+            let wanted = sheets.into_iter().filter(|(wanted, _)| *wanted);
+            wanted.for_each(|(_, sheet)| {
+                space.add(texture(sheet, size));
+                // A PNG of level 0 beside it, where a factor is baked in.
+                let fallback =
+                    if sheet == Sheet::Aniso { 0 } else { 3 * u64::from(size.0) * u64::from(size.1) };
+                space.most += fallback;
+            });
+        }
+        for slot in
+            [Slot::BaseColor, Slot::Emissive, Slot::Occlusion].into_iter().filter(|_| how.all_textures)
+        {
+            // Occlusion beside roughness is packed with it.
+            let image = image(material, slot).filter(|image| maps[2] != Some(*image));
+            if let Some(size) = image.filter(|&image| plain.insert(image)).as_ref().and_then(size) {
+                let role = if slot == Slot::Occlusion { Role::Data } else { Role::Color };
+                space.add(options.space(options.encoding(role, options.color_format).format, size));
+            }
+        }
+    }
+    // The model takes along what it had.
+    let along = document.files().into_iter().chain([input.to_path_buf()]);
+    space.most += along.filter_map(|file| files.size(&file)).sum::<u64>();
+    Ok(space)
+}
+
+/// Refuses what cannot be baked or written, before the first texture is.
+fn check(
+    input: &Path,
+    how: &GltfOptions,
+    scene: &Scene,
+    document: &Document,
+    surfaces: &[Surface],
+    plan: &Plan,
+    out: &dyn Sink,
+) -> Result<(), Error> {
+    let options = &how.textures;
+    let (mut names, mut space) = (curvature::check(input, how, scene, document)?, Space::default());
+    for ((name, planned), surface) in plan.surfaces.iter().zip(surfaces) {
+        let size = surface.maps.maps.size();
+        let mut add = |sheet: Sheet| {
+            let name = format!("{name}_{}", Content::from(sheet).name());
+            names.extend(options.files(&name));
+            space.add(options.space(options.of_sheet(sheet).format, size));
+            name
+        };
+        let replaced: Vec<String> =
+            planned.iter().filter_map(|p| Some(add(p.sheet)).filter(|_| p.changed)).collect();
+        if how.form.aniso() {
+            add(Sheet::Aniso);
+        }
+        space.most += replaced.len() as u64 * 3 * u64::from(size.0) * u64::from(size.1);
+        names.extend(replaced.into_iter().map(|name| format!("{name}.png")));
+    }
+    for color in &plan.colors {
+        names.extend(options.files(&color.name));
+        if let Some(image) = &scene.images[color.place.image] {
+            space.add(options.space(color.encoding(options).format, (image.width, image.height)));
+        }
+    }
+    names.extend(plan.turned.iter().map(|turned| turned.file.clone()));
+    if let Some(file) = names.iter().filter_map(|name| out.place(name)).find(|file| document.names_file(file))
+    {
+        return Err(Error::OverMap { file });
+    }
+
+    // The model and what it takes along; what is there already is no loss.
+    let model = file_name(input);
+    let (packed, _) = pack(document, &model, out)?;
+    space.most += packed.iter().map(|(_, bytes)| bytes.len() as u64).sum::<u64>();
+    let is_new = |(name, bytes): &(String, Vec<u8>)| {
+        *name == model || out.get(name).is_some_and(|there| there != *bytes)
+    };
+    names.extend(packed.into_iter().filter(is_new).map(|(name, _)| name));
+    let stem = input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    names.push(format!("{stem}.kinran.json"));
+    out.expect(&names, space)
+}
+
+/// The surfaces of a document's materials; materials that share one share its textures.
+fn surfaces(
+    input: &Path,
+    how: &GltfOptions,
+    scene: &Scene,
+    document: &Document,
+) -> (Vec<Surface>, Vec<String>) {
+    let (mut surfaces, mut warnings) = (Vec::<Surface>::new(), scene.warnings.clone());
+    let mut apart = false;
+    // A document without materials has one in the scene that it cannot name.
+    for material in 0..document.material_count().min(scene.materials.len()) {
+        let surface = material_surface(scene, material);
+        if !matches!(surface, Err(NoSurface::Apart(_))) {
+            let name = |image| document.image_name(image);
+            warnings.extend(texel_remarks(scene, material, &name, how.green));
+        }
+        match surface {
+            // Factors alone need no texture.
+            Ok(surface) if surface.place.is_none() => {}
+            Ok(mut maps) => {
+                let key = Key::new(scene, material);
+                maps.maps.normal.y_down = how.green == Some(Green::Down);
+                match surfaces.iter_mut().find(|known| known.key == key) {
+                    Some(known) => known.materials.push(material),
+                    None => surfaces.push(Surface { materials: vec![material], maps, key }),
+                }
+            }
+            Err(NoSurface::Plain) => {}
+            Err(NoSurface::Apart(reason)) => {
+                warnings.push(reason);
+                apart = true;
+            }
+        }
+    }
+    let skin = scene.primitives.iter().any(|p| how.wants(scene, p));
+    if !apart && surfaces.is_empty() && !how.all_textures && !skin {
+        warnings.push(format!(
+            "{}: no material has a normal, a roughness or an anisotropy map; nothing but --all-textures would bake anything",
+            file_name(input)
+        ));
+    }
+    (surfaces, warnings)
+}
+
+/// What the texels of a material's maps say against them, a sentence each; `name` gives images' names.
+pub fn texel_remarks(
+    scene: &Scene,
+    material: usize,
+    name: &dyn Fn(usize) -> String,
+    said: Option<Green>,
+) -> Vec<String> {
+    let m = &scene.materials[material];
+    let image = |place: Option<&TextureRef>| -> Option<(String, &Image)> {
+        let place = place?;
+        Some((name(place.image), scene.images.get(place.image)?.as_deref()?))
+    };
+    let mut remarks = Vec::new();
+    if let Some((name, normal)) = image(m.normal.as_ref()) {
+        remarks.extend(normal_remarks(&name, normal, said));
+    }
+    let anisotropy = m.anisotropy.as_ref().and_then(|a| a.texture.as_ref());
+    let numbers: [(&str, Option<&TextureRef>, &[usize]); 6] = [
+        ("roughness", m.metallic_roughness.as_ref(), &[1]),
+        ("metalness", m.metallic_roughness.as_ref(), &[2]),
+        ("anisotropy", anisotropy, &[0, 1, 2]),
+        ("occlusion", m.occlusion.as_ref(), &[0]),
+        ("base colour", m.base_color.as_ref(), &[0, 1, 2]),
+        ("opacity", m.base_color.as_ref(), &[3]),
+    ];
+    for (what, place, channels) in numbers {
+        let outside = image(place).and_then(|(name, image)| Some((name, outside_unit(image, channels)?)));
+        remarks.extend(outside.map(|(name, outside)| format!("its {what} in \"{name}\": {outside}")));
+    }
+    remarks.into_iter().map(|remark| format!("material \"{}\": {remark}", m.name)).collect()
+}
+
+/// What the texels of a normal map say against it.
+fn normal_remarks(name: &str, image: &Image, said: Option<Green>) -> Vec<String> {
+    let guess = guess_green(image);
+    let green = match (guess, said) {
+        (GreenGuess::Down, None) => Some(
+            "the slopes of its normal map say that green points down, as in DirectX, and glTF's points up; if they \
+             are right, bake it with --y-down",
+        ),
+        (GreenGuess::Down, Some(Green::Up)) => {
+            Some("its normal map is taken as +Y by --y-up, though its slopes look like -Y")
+        }
+        (GreenGuess::Up, Some(Green::Down)) => {
+            Some("its normal map is taken as -Y by --y-down, though its slopes look like +Y")
+        }
+        _ => None,
+    };
+    let lengths = odd_lengths(image).map(|lengths| {
+        format!("its normal map: {lengths}; red, green and blue are brought to it together, as in glTF")
+    });
+    let below = below_surface(image)
+        .map(|below| format!("its normal map \"{name}\": {below}; they are laid on the surface"));
+    green.map(str::to_owned).into_iter().chain(lengths).chain(below).collect()
+}
+
+/// What makes two materials' surfaces the same.
+#[derive(Debug, PartialEq)]
+struct Key {
+    places: [Option<TextureRef>; 3],
+    normal_scale: f32,
+    roughness: f32,
+    anisotropy: Option<(f32, f32)>,
+    occlusion_packed: bool,
+}
+
+impl Key {
+    fn new(scene: &Scene, material: usize) -> Self {
+        let m = &scene.materials[material];
+        let anisotropy = m.anisotropy.as_ref().filter(|a| a.strength > 0.0);
+        Key {
+            places: [
+                m.normal.clone(),
+                m.metallic_roughness.clone(),
+                anisotropy.and_then(|a| a.texture.clone()),
+            ],
+            normal_scale: m.normal_scale,
+            roughness: m.roughness_factor,
+            anisotropy: anisotropy.map(|a| (a.strength, a.rotation)),
+            occlusion_packed: occlusion_is_packed(scene, material),
+        }
+    }
+}
+
+/// Whether occlusion is read from the metallic-roughness texture.
+fn occlusion_is_packed(scene: &Scene, material: usize) -> bool {
+    let m = &scene.materials[material];
+    match (&m.occlusion, &m.metallic_roughness) {
+        (Some(o), Some(r)) => (o.image, o.runtime) == (r.image, r.runtime) && o.lies_as(r),
+        _ => false,
+    }
+}
+
+/// File names given so far.
+#[derive(Default)]
+struct Names(Vec<String>);
+
+impl Names {
+    fn unique(&mut self, name: &str) -> String {
+        let candidates = std::iter::once(name.to_owned()).chain((2..).map(|i| format!("{name}_{i}")));
+        let free = |candidate: &String| !self.0.iter().any(|known| known.eq_ignore_ascii_case(candidate));
+        let unique = candidates.into_iter().find(free).unwrap_or_default();
+        self.0.push(unique.clone());
+        unique
+    }
+}
+
+struct SurfaceBaker<'a> {
+    how: &'a GltfOptions,
+    scene: &'a Scene,
+    document: &'a mut Document,
+    name: String,
+    /// Files besides the textures.
+    written: &'a mut Vec<WrittenFile>,
+    out: &'a dyn Sink,
+    task: Task<'a>,
+}
+
+/// Where the maps of a surface are, in the order in which [`material_surface`] takes their place for the surface's.
+const SURFACE_SLOTS: [Slot; 3] = [Slot::Normal, Slot::Anisotropy, Slot::MetallicRoughness];
+
+/// A sheet, the slot it goes to, and whether the slot's image no longer shows level 0.
+struct Planned {
+    sheet: Sheet,
+    slot: Slot,
+    changed: bool,
+}
+
+impl SurfaceBaker<'_> {
+    fn bake(&mut self, surface: &Surface, planned: &[Planned]) -> Result<SurfaceReport, Error> {
+        let (options, materials) = (&self.how.textures, surface.materials.as_slice());
+        let m = &self.scene.materials[materials[0]];
+        let maps = &surface.maps.maps;
+        let size = maps.size();
+        let mr = m.metallic_roughness.as_ref().and_then(|place| self.scene.images[place.image].clone());
+
+        let mut requests: Vec<SheetRequest> = planned
+            .iter()
+            .map(|planned| {
+                let is_roughness = planned.slot == Slot::MetallicRoughness;
+                SheetRequest {
+                    sheet: planned.sheet,
+                    encoding: options.of_sheet(planned.sheet),
+                    packed_with: mr.as_deref().filter(|_| is_roughness),
+                }
+            })
+            .collect();
+        let plain = Encoding { format: Format::Rgba8, encoder: Encoder::Portable, preset: Preset::Fast };
+        let fallbacks: Vec<SheetRequest> = planned
+            .iter()
+            .zip(&requests)
+            .filter(|(planned, _)| planned.changed)
+            .map(|(_, request)| SheetRequest { encoding: plain, ..request.clone() })
+            .collect();
+        requests.extend(fallbacks);
+        if self.how.form.aniso() {
+            requests.push(SheetRequest {
+                sheet: Sheet::Aniso,
+                encoding: options.of_sheet(Sheet::Aniso),
+                packed_with: None,
+            });
+        }
+
+        let filtering = self.task.begin(Stage::Filtering(options.filter), &m.name, mip_texels(size))?;
+        let baked = bake_surface(maps, options.surface(), &requests, &|texels| filtering.tick(texels))?;
+        drop(filtering);
+        let writing = self.task.begin(Stage::Writing, &m.name, baked.textures.len() as u64)?;
+
+        let mut report = SurfaceReport {
+            name: m.name.clone(),
+            inputs: inputs(self.scene, self.document, materials[0])?,
+            outputs: Vec::new(),
+            levels: baked.levels,
+        };
+        let mut textures = baked.textures;
+        let aniso = self.how.form.aniso().then(|| textures.pop()).flatten();
+        let mut fallback = textures.split_off(planned.len()).into_iter();
+        for (planned, texture) in planned.iter().zip(textures) {
+            let image = if planned.changed { fallback.next() } else { None };
+            let written = 1 + u64::from(image.is_some());
+            report.outputs.extend(self.place(planned, texture, image, materials)?);
+            writing.tick(written)?;
+        }
+        if let Some(aniso) = aniso {
+            let name = format!("{}_aniso", self.name);
+            let outputs = put_texture(options, &name, Content::Aniso, aniso, self.out)?;
+            self.place_aniso(&outputs, materials);
+            report.outputs.extend(outputs);
+        }
+        Ok(report)
+    }
+
+    /// Writes a texture and puts it into its slot of every material.
+    fn place(
+        &mut self,
+        planned: &Planned,
+        texture: Texture,
+        fallback: Option<Texture>,
+        materials: &[usize],
+    ) -> Result<Vec<Output>, Error> {
+        let map = Content::from(planned.sheet);
+        let name = format!("{}_{}", self.name, map.name());
+        let outputs = put_texture(&self.how.textures, &name, map, texture, self.out)?;
+
+        let old = self.document.texture(materials[0], planned.slot);
+        let source = match fallback {
+            Some(level_0) => {
+                let file = format!("{name}.png");
+                let bytes = encode_png(&image_of(&level_0)?)?;
+                self.out.put(&file, &bytes)?;
+                self.written.push(WrittenFile::new(&file, &bytes));
+                Some(self.document.add_image_file(&file))
+            }
+            None => old.and_then(|texture| self.document.texture_image(texture)),
+        };
+        let alternatives = alternatives(self.document, &outputs);
+        let other = |slot: &Slot| self.document.texture(materials[0], *slot);
+        let like = old.or_else(|| SURFACE_SLOTS.iter().find_map(other));
+        let new = self.document.add_texture(like, source, &alternatives);
+        for &material in materials {
+            let is_new = self.document.texture(material, planned.slot).is_none();
+            let like = is_new.then(|| like_surface(self.document.material(material)));
+            let occlusion =
+                planned.slot == Slot::MetallicRoughness && occlusion_is_packed(self.scene, material);
+            self.document.set_texture(material, planned.slot, new);
+            if occlusion {
+                self.document.set_texture(material, Slot::Occlusion, new);
+            }
+            reset_factors(self.document.material_mut(material), planned.slot, like);
+        }
+        Ok(outputs)
+    }
+
+    /// Refers to an aniso texture, which lies as the first map of [`SURFACE_SLOTS`] does.
+    fn place_aniso(&mut self, outputs: &[Output], materials: &[usize]) {
+        let alternatives = alternatives(self.document, outputs);
+        let like = SURFACE_SLOTS.iter().find_map(|&slot| self.document.texture(materials[0], slot));
+        let new = self.document.add_optional_texture(like, &alternatives);
+        for &material in materials {
+            self.document.set_texture(material, Slot::Aniso, new);
+            let material = self.document.material_mut(material);
+            let info = like_surface(material);
+            let texture = material.get_mut("extensions").and_then(|e| e.get_mut("KINRAN_materials_aniso"));
+            if let Some(texture) =
+                texture.and_then(|e| e.get_mut("anisoTexture")).and_then(Value::as_object_mut)
+            {
+                texture.extend(info);
+            }
+        }
+    }
+}
+
+/// The maps of a material's surface.
+fn inputs(scene: &Scene, document: &Document, material: usize) -> Result<Vec<Input>, Error> {
+    let m = &scene.materials[material];
+    let anisotropy = m.anisotropy.as_ref().and_then(|a| a.texture.as_ref());
+    let roughness = m.metallic_roughness.as_ref();
+    [("normal", m.normal.as_ref()), ("metallicRoughness", roughness), ("anisotropy", anisotropy)]
+        .into_iter()
+        .filter_map(|(role, place)| Some((role, place?)))
+        .filter_map(|(role, place)| Some((role, place, scene.images[place.image].as_ref()?)))
+        .map(|(role, place, image)| input(document, place.image, role, image))
+        .collect()
+}
+
+fn input(document: &Document, index: usize, role: &str, image: &Image) -> Result<Input, Error> {
+    Ok(Input {
+        file: document.image_name(index),
+        role: role.into(),
+        width: image.width,
+        height: image.height,
+        blake3: blake3::hash(&document.image_bytes(index)?).to_hex().to_string(),
+        notes: image.notes.clone(),
+    })
+}
+
+/// The files of a texture as a document refers to them.
+fn alternatives(document: &mut Document, outputs: &[Output]) -> Vec<(TextureExtension, usize)> {
+    outputs
+        .iter()
+        .map(|output| {
+            let dds = Path::new(&output.file).extension().is_some_and(|e| e == "dds");
+            let extension = if dds { TextureExtension::Dds } else { TextureExtension::Ktx2 };
+            (extension, document.add_image_file(&output.file))
+        })
+        .collect()
+}
+
+/// Where the first map of a material's [`SURFACE_SLOTS`] lies on the mesh.
+fn like_surface(material: &kinran_scene::Object) -> kinran_scene::Object {
+    let anisotropy = (material.get("extensions"))
+        .and_then(|e| e.get("KHR_materials_anisotropy")?.get("anisotropyTexture"));
+    let roughness = material.get("pbrMetallicRoughness").and_then(|pbr| pbr.get("metallicRoughnessTexture"));
+    let texture = material.get("normalTexture").or(anisotropy).or(roughness).and_then(Value::as_object);
+    let mut like = texture.cloned().unwrap_or_default();
+    like.retain(|key, _| key == "texCoord" || key == "extensions");
+    like
+}
+
+/// Sets the factors that are in the texture now to one, and lays a texture that is new on the mesh as `like` says.
+fn reset_factors(material: &mut kinran_scene::Object, slot: Slot, like: Option<kinran_scene::Object>) {
+    let lay = |texture: Option<&mut Value>| {
+        if let (Some(texture), Some(like)) = (texture.and_then(Value::as_object_mut), like) {
+            texture.extend(like);
+        }
+    };
+    match slot {
+        Slot::Normal => {
+            if let Some(texture) = material.get_mut("normalTexture").and_then(Value::as_object_mut) {
+                texture.shift_remove("scale");
+            }
+        }
+        Slot::MetallicRoughness => {
+            if let Some(pbr) = material.get_mut("pbrMetallicRoughness").and_then(Value::as_object_mut) {
+                pbr.shift_remove("roughnessFactor");
+                lay(pbr.get_mut("metallicRoughnessTexture"));
+            }
+        }
+        Slot::Anisotropy => {
+            let extension = material
+                .get_mut("extensions")
+                .and_then(|e| e.get_mut("KHR_materials_anisotropy"))
+                .and_then(Value::as_object_mut);
+            if let Some(extension) = extension {
+                extension.insert("anisotropyStrength".into(), 1.0.into());
+                extension.shift_remove("anisotropyRotation");
+                lay(extension.get_mut("anisotropyTexture"));
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Level 0 of an RGBA8 texture as an RGB image.
+fn image_of(texture: &Texture) -> Result<Image, Error> {
+    let level = &texture.levels[0];
+    let rgb = level.data.chunks_exact(4).flat_map(|t| [t[0], t[1], t[2]]).collect();
+    Ok(Image::new(level.width, level.height, Channels::Rgb, Pixels::U8(rgb))?)
+}
+
+/// Bakes the textures that need no filter of their own: base colour, emission, occlusion.
+fn bake_colors(
+    how: &GltfOptions,
+    scene: &Scene,
+    document: &mut Document,
+    colors: &[Colored],
+    report: &mut Report,
+    out: &dyn Sink,
+    task: Task<'_>,
+) -> Result<(), Error> {
+    let image = |color: &Colored| scene.images[color.place.image].as_ref();
+    let texels = colors.iter().filter_map(image).map(|image| mip_texels((image.width, image.height)));
+    let averaging = task.begin(Stage::Colors, "", texels.sum())?;
+    for color in colors {
+        let (place, content) = (&color.place, color.content());
+        let Some(image) = &scene.images[place.image] else { continue };
+        let (kernel, encoding) = (how.textures.kernel, color.encoding(&how.textures));
+        let texture = bake_plain(image, color.transfer, encoding, kernel, place.wrap, &|texels| {
+            averaging.tick(texels)
+        })?;
+        let outputs = put_texture(&how.textures, &color.name, content, texture, out)?;
+        let (material, slot) = color.slots[0];
+        let old = document.texture(material, slot);
+        let source = old.and_then(|texture| document.texture_image(texture));
+        let alternatives = alternatives(document, &outputs);
+        let texture = document.add_texture(old, source, &alternatives);
+        report.surfaces.push(SurfaceReport {
+            name: color.name.clone(),
+            inputs: vec![input(document, place.image, content.name(), image)?],
+            outputs,
+            levels: Vec::new(),
+        });
+        for &(material, slot) in &color.slots {
+            document.set_texture(material, slot, texture);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,126 @@
+//! Where files go: a folder on a disk, or memory.
+
+use std::path::{Path, PathBuf};
+
+use kinran_image::{Format, Memory, full_level_count, level_size, write_atomically};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::Error;
+use crate::options::Container;
+
+/// Takes the files of a task. Names are relative and `/`-separated.
+pub trait Sink: Sync {
+    /// Is asked once, before long work, with every name that may be written and the space that it may take: the place to
+    /// refuse. Nothing is refused by default.
+    ///
+    /// # Errors
+    /// Whatever the destination has against it, as [`Error::Refused`].
+    fn expect(&self, names: &[String], space: Space) -> Result<(), Error> {
+        let _ = (names, space);
+        Ok(())
+    }
+
+    /// Takes a file, whole or not at all; one of that name is replaced.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    fn put(&self, name: &str, bytes: &[u8]) -> Result<(), Error>;
+
+    /// The file of a name, where there is one.
+    fn get(&self, name: &str) -> Option<Vec<u8>>;
+
+    /// Where on the system's disk a name is; `None` where it is not on a disk.
+    fn place(&self, name: &str) -> Option<PathBuf>;
+}
+
+/// A folder on a disk. It is made when the first file comes; each file appears by rename.
+#[derive(Clone, Debug)]
+pub struct OutputFolder {
+    /// Its path.
+    pub path: PathBuf,
+}
+
+impl OutputFolder {
+    /// The folder at a path.
+    pub fn new(path: impl AsRef<Path>) -> Self {
+        OutputFolder { path: path.as_ref().to_path_buf() }
+    }
+}
+
+impl Sink for OutputFolder {
+    fn put(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+        let path = self.path.join(name);
+        let folder = path.parent().unwrap_or(&self.path);
+        std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
+        Ok(write_atomically(&path, bytes)?)
+    }
+
+    fn get(&self, name: &str) -> Option<Vec<u8>> {
+        let path = self.path.join(name);
+        path.is_file().then(|| std::fs::read(path).ok())?
+    }
+
+    fn place(&self, name: &str) -> Option<PathBuf> {
+        Some(self.path.join(name))
+    }
+}
+
+impl Sink for Memory {
+    fn put(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+        self.insert(name, bytes);
+        Ok(())
+    }
+
+    fn get(&self, name: &str) -> Option<Vec<u8>> {
+        Memory::get(self, name).map(|bytes| bytes.to_vec())
+    }
+
+    fn place(&self, _: &str) -> Option<PathBuf> {
+        None
+    }
+}
+
+/// Bytes that files will take, as far as that can be told before they are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Space {
+    /// They take no less.
+    pub least: u64,
+    /// They take no more, but for small files such as reports.
+    pub most: u64,
+}
+
+/// What Zstandard leaves of a mip chain at least, as one over this; chosen by eye: BC7 of smooth maps keeps an eighth.
+const ZSTD_LEAST: u64 = 16;
+
+impl Space {
+    /// That of files whose size is known.
+    pub fn exact(bytes: u64) -> Self {
+        Space { least: bytes, most: bytes }
+    }
+
+    /// That of a texture with all its mips; `zstd` is the level of KTX2 files, 0 for none.
+    pub fn of_texture(container: Container, zstd: i32, format: Format, (width, height): (u32, u32)) -> Self {
+        let levels = 0..full_level_count(width, height);
+        let chain =
+            levels.map(|level| format.level_bytes(level_size(width, level), level_size(height, level)));
+        let chain = chain.sum::<usize>() as u64;
+        let mut space = Space::default();
+        for extension in container.extensions() {
+            let shrinks = *extension == "ktx2" && zstd > 0;
+            space.add(Space { least: if shrinks { chain / ZSTD_LEAST } else { chain }, most: chain });
+        }
+        space
+    }
+
+    /// What is needed where files of so many bytes make room.
+    pub fn beyond(self, replaced: u64) -> Self {
+        Space { least: self.least.saturating_sub(replaced), most: self.most.saturating_sub(replaced) }
+    }
+
+    /// Adds that of other files.
+    pub fn add(&mut self, other: Space) {
+        self.least += other.least;
+        self.most += other.most;
+    }
+}

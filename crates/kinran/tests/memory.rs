@@ -1,0 +1,158 @@
+//! Bakes from memory to memory, beside the same bakes from disk to disk.
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use common::{maps, model, png};
+use kinran::bake::{FolderOptions, GltfOptions, Which, folder, gltf, understand};
+use kinran::options::{Container, Form};
+use kinran::{Cancel, Disk, Error, Files, Memory, OutputFolder, Progress, Sink, Task};
+use kinran_image::{Channels, Encoder};
+
+/// The files in a folder of a disk, by their paths in it.
+fn read_all(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let (mut all, mut folders) = (BTreeMap::new(), vec![root.to_path_buf()]);
+    while let Some(folder) = folders.pop() {
+        for entry in Disk.list(&folder).unwrap() {
+            match entry.is_folder {
+                true => folders.push(entry.path),
+                false => {
+                    let name = entry.path.strip_prefix(root).unwrap().to_path_buf();
+                    all.insert(name, std::fs::read(&entry.path).unwrap());
+                }
+            }
+        }
+    }
+    all
+}
+
+/// What a bake of these files gives in memory, and on a disk.
+fn both_ways(
+    files: &[(&str, Vec<u8>)],
+    bake: impl Fn(&dyn Files, &Path, &dyn Sink) -> Result<(), Error>,
+) -> [BTreeMap<PathBuf, Vec<u8>>; 2] {
+    let (input, output) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    for (name, bytes) in files {
+        let path = input.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    }
+    bake(&Disk, input.path(), &OutputFolder::new(output.path())).unwrap();
+    let (memory, out) = (files.iter().cloned().collect::<Memory>(), Memory::new());
+    bake(&memory, Path::new(""), &out).unwrap();
+    let of_memory = out.files().into_iter().map(|(name, bytes)| (name, bytes.to_vec())).collect();
+    [of_memory, read_all(output.path())]
+}
+
+fn names(files: &BTreeMap<PathBuf, Vec<u8>>) -> Vec<String> {
+    files.keys().map(|name| name.display().to_string()).collect()
+}
+
+fn bake_maps(files: &dyn Files, root: &Path, out: &dyn Sink, task: Task<'_>) -> Result<(), Error> {
+    let mut how = FolderOptions::default();
+    (how.form, how.textures.container) = (Form::Both, Container::Both);
+    how.textures.encoder = Some(Encoder::Portable);
+    let input = root.join("cloth");
+    let understood = understand(files, &input, &how)?;
+    folder(files, &input, &understood, &how, out, task).map(drop)
+}
+
+fn bake_model(files: &dyn Files, root: &Path, out: &dyn Sink, task: Task<'_>) -> Result<(), Error> {
+    let mut how = GltfOptions::default();
+    (how.all_textures, how.estimate_normals, how.curvature.of) = (true, true, Which::All);
+    how.textures.encoder = Some(Encoder::Portable);
+    gltf(files, &root.join("models/drum.gltf"), &how, out, task).map(drop)
+}
+
+#[test]
+fn a_folder_in_memory_is_baked_otherwise_than_one_on_a_disk() {
+    let [memory, disk] = both_ways(&maps(), |files, root, out| bake_maps(files, root, out, Task::QUIET));
+    assert_eq!(names(&memory), names(&disk));
+    assert!(names(&memory).contains(&"silk_orm.dds".into()), "{:?}", names(&memory));
+    assert!(memory == disk, "bytes differ");
+}
+
+#[test]
+fn a_model_in_memory_is_baked_otherwise_than_one_on_a_disk() {
+    let [memory, disk] = both_ways(&model(), |files, root, out| bake_model(files, root, out, Task::QUIET));
+    assert_eq!(names(&memory), names(&disk));
+    let has = |end: &str| names(&memory).iter().any(|name| name.ends_with(end));
+    assert!(has("_normal.ktx2") && has("drum.gltf") && has(".png") && has(".bin"), "{:?}", names(&memory));
+    assert!(memory == disk, "bytes differ");
+}
+
+#[test]
+fn a_model_in_memory_reads_what_lies_outside_of_its_folder() {
+    let mut files = model();
+    let json = String::from_utf8(files[0].1.clone()).unwrap();
+    files[0].1 = json.replace("maps/bumps.png", "../secret.png").into_bytes();
+    files.push(("secret.png", png(Channels::Rgb, 9)));
+    let files: Memory = files.into_iter().collect();
+    let error = bake_model(&files, Path::new(""), &Memory::new(), Task::QUIET).unwrap_err();
+    assert_eq!(error.code(), "input", "{error}");
+}
+
+#[test]
+fn work_ends_before_its_end_or_never() {
+    let running: Mutex<BTreeMap<String, (u64, u64)>> = Mutex::default();
+    let ended = AtomicU64::new(0);
+    let tell = |p: Progress<'_>| {
+        let mut running = running.lock().unwrap();
+        match p.is_over {
+            true => {
+                let (done, total) = running.remove(&p.to_string()).unwrap();
+                assert!(total == 0 || done == total, "{p} ended at {done} of {total}");
+                ended.fetch_add(1, Ordering::Relaxed);
+            }
+            false => drop(running.insert(p.to_string(), (p.done, p.total))),
+        }
+    };
+    let cancel = Cancel::new();
+    let task = Task { tell: &tell, cancel: &cancel };
+    bake_maps(&maps().into_iter().collect::<Memory>(), Path::new(""), &Memory::new(), task).unwrap();
+    bake_model(&model().into_iter().collect::<Memory>(), Path::new(""), &Memory::new(), task).unwrap();
+    assert!(running.lock().unwrap().is_empty(), "{running:?} never ended");
+    assert!(ended.load(Ordering::Relaxed) > 8, "{ended:?}");
+}
+
+#[test]
+fn a_cancelled_bake_goes_on_or_leaves_a_file_half_written() {
+    type Bake = fn(&dyn Files, &Path, &dyn Sink, Task<'_>) -> Result<(), Error>;
+    let bakes: [(&str, Vec<(&str, Vec<u8>)>, Bake); 2] =
+        [("folder", maps(), bake_maps), ("model", model(), bake_model)];
+    for (what, files, bake) in bakes {
+        let files: Memory = files.into_iter().collect();
+        let (whole, told) = (Memory::new(), AtomicU64::new(0));
+        let count = |_: Progress<'_>| {
+            told.fetch_add(1, Ordering::Relaxed);
+        };
+        bake(&files, Path::new(""), &whole, Task { tell: &count, cancel: &Cancel::new() }).unwrap();
+        let all = told.load(Ordering::Relaxed);
+        for stop_at in 0..all {
+            let (cancel, told, out) = (Cancel::new(), AtomicU64::new(0), Memory::new());
+            let tell = |_: Progress<'_>| {
+                if told.fetch_add(1, Ordering::Relaxed) >= stop_at {
+                    cancel.cancel();
+                }
+            };
+            match bake(&files, Path::new(""), &out, Task { tell: &tell, cancel: &cancel }) {
+                Err(Error::Cancelled) => {}
+                Err(error) => panic!("{what}, stopped at {stop_at} of {all}: {error}"),
+                // The last that is told are ends.
+                Ok(()) => assert!(stop_at + 3 >= all, "{what}, stopped at {stop_at} of {all}, was done"),
+            }
+            for (name, bytes) in out.files() {
+                let wanted = whole.get(&name);
+                assert!(
+                    wanted.is_some_and(|wanted| wanted == bytes),
+                    "{what}, stopped at {stop_at}: {}",
+                    name.display()
+                );
+            }
+        }
+    }
+}
