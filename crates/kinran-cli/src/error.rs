@@ -305,3 +305,26 @@ impl Error {
 fn flag_of(given: &str) -> String {
     given.split([' ', '=']).next().unwrap_or(given).to_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Who stopped the work would look for a mistake in the input.
+    #[test]
+    fn stopped_work_is_told_as_a_failure() {
+        let of_image = || kinran_image::Error::from(Cancelled);
+        let errors: [Error; 7] = [
+            Cancelled.into(),
+            of_image().into(),
+            kinran_bake::folder::FolderError::Image(of_image()).into(),
+            kinran_scene::Error::from(Cancelled).into(),
+            kinran_scene::Error::from(of_image()).into(),
+            kinran_render::Error::from(Cancelled).into(),
+            Error::from(of_image()).about("model.glb"),
+        ];
+        for error in errors {
+            assert_eq!((error.code(), error.exit_code()), ("cancelled", 130), "{error:?}");
+        }
+    }
+}
