@@ -42,5 +42,5 @@ pub mod skin_lut;
 pub mod stamps;
 
 pub use kinran_image::srgb::{linear_from_srgb, srgb_from_linear};
-pub use material::{MaterialSurface, NoSurface, material_surface};
+pub use material::{MaterialSurface, NoSurface, material_reflectance, material_surface};
 pub use mips::{BAND_ROWS, Rgba8Level, bake_plain, compress_levels, pack_channels, plain_levels};

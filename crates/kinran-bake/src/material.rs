@@ -5,7 +5,9 @@ use std::sync::Arc;
 use kinran_image::Image;
 use kinran_scene::{Material, Scene, TextureRef, Wrap};
 
-use crate::aniso::{NormalMap, RoughnessMaps, ScalarMap, SurfaceMaps};
+use crate::aniso::{
+    ColorMap, Dielectric, NormalMap, Reflectance, ReflectanceMaps, RoughnessMaps, ScalarMap, SurfaceMaps,
+};
 
 /// Normals and roughness of a material as the filters take them, and how its UVs are laid out.
 #[derive(Clone, Debug)]
@@ -82,6 +84,49 @@ pub fn material_surface(scene: &Scene, material: usize) -> Result<MaterialSurfac
         place: place.cloned(),
     })
 }
+
+/// What the texels of a material reflect, where its base colour lies as its surface does. `None` where it is the same
+/// everywhere or the maps lie apart; a sentence where something else says what reflects.
+///
+/// # Errors
+/// The sentence.
+///
+/// # Panics
+/// When there is no such material.
+pub fn material_reflectance(
+    scene: &Scene,
+    material: usize,
+    surface: &MaterialSurface,
+) -> Result<Option<Reflectance>, String> {
+    let m = &scene.materials[material];
+    let image = |place: &TextureRef| -> Option<Arc<Image>> { scene.images.get(place.image)?.clone() };
+    let Some(metallic) = m.metallic_roughness.as_ref().and_then(image) else { return Ok(None) };
+    let (Some(base), Some(place)) = (&m.base_color, &surface.place) else { return Ok(None) };
+    let Some(base_image) = image(base) else { return Ok(None) };
+    if !base.lies_as(place) {
+        return Err(format!(
+            "material \"{}\": baseColorTexture lies on the mesh in another way than the surface's maps; they are filtered \
+             one by one",
+            m.name
+        ));
+    }
+    if let Some(other) = m.ignored_extensions.iter().find(|name| OTHER_REFLECTANCE.contains(&name.as_str())) {
+        return Err(format!(
+            "material \"{}\": {other} says what reflects; its maps are filtered one by one",
+            m.name
+        ));
+    }
+    let maps = ReflectanceMaps::Metallic {
+        base: ColorMap { image: Some(base_image), factor: m.base_color_factor.truncate() },
+        metallic: ScalarMap { image: Some((metallic, 2)), factor: m.metallic_factor },
+        dielectric: Dielectric::default(),
+    };
+    Ok(Some(Reflectance { maps, wrap: place.wrap }))
+}
+
+/// Extensions that say what a dielectric reflects, or what metal does.
+const OTHER_REFLECTANCE: [&str; 3] =
+    ["KHR_materials_ior", "KHR_materials_specular", "KHR_materials_pbrSpecularGlossiness"];
 
 fn apart(
     material: &Material,

@@ -15,7 +15,7 @@
 //! at all over and then more and more closely ([`together`]).
 
 use kinran_image::srgb::byte_from_linear;
-use kinran_image::{Cancelled, Tick, Transfer, full_level_count};
+use kinran_image::{Cancelled, Image, Tick, Transfer, full_level_count};
 
 use crate::aniso::maps::read_scalar;
 use crate::aniso::reflectance::read_color;
@@ -64,17 +64,9 @@ pub fn base_and_metal(
     kernel: Kernel,
     tick: &Tick<'_>,
 ) -> Result<BaseAndMetal, Apart> {
-    let ReflectanceMaps::Metallic { base, metallic, dielectric } = &reflectance.maps else {
-        return Err(Apart::Specular);
-    };
-    let dielectric = dielectric.constant().ok_or(Apart::Dielectric)?.to_array();
-    let Some(image) = base.image.as_ref().filter(|_| varies(metallic)) else { return Err(Apart::Alike) };
+    let Plan { base, image, metallic, dielectric, of_color, of_surface } = plan(reflectance, surface)?;
     let own = (image.width, image.height);
     let size = (own.0.max(surface.0), own.1.max(surface.1));
-    let (Some(of_color), Some(of_surface)) = (halvings(size, own), halvings(size, surface)) else {
-        return Err(Apart::Sizes(own.0, own.1, surface.0, surface.1));
-    };
-
     let wrap = reflectance.wrap;
     let source = Rows { base, metallic, size, reflectance };
     let limits = Limits { base: base.factor.to_array(), metallic: metallic.factor };
@@ -99,6 +91,39 @@ pub fn base_and_metal(
         }
     }
     Ok(BaseAndMetal { color, metallic: metal })
+}
+
+/// Why [`base_and_metal`] would not choose them together, if it would not.
+pub fn apart(reflectance: &Reflectance, surface: (u32, u32)) -> Option<Apart> {
+    plan(reflectance, surface).err()
+}
+
+/// What is chosen for.
+struct Plan<'a> {
+    base: &'a ColorMap,
+    image: &'a Image,
+    metallic: &'a ScalarMap,
+    /// F0 of what is not metal.
+    dielectric: [f32; 3],
+    /// How often the base colour's image and the surface are halves of the larger one.
+    of_color: usize,
+    of_surface: usize,
+}
+
+fn plan(reflectance: &Reflectance, surface: (u32, u32)) -> Result<Plan<'_>, Apart> {
+    let ReflectanceMaps::Metallic { base, metallic, dielectric } = &reflectance.maps else {
+        return Err(Apart::Specular);
+    };
+    let dielectric = dielectric.constant().ok_or(Apart::Dielectric)?.to_array();
+    let Some(image) = base.image.as_deref().filter(|_| varies(metallic)) else { return Err(Apart::Alike) };
+    let own = (image.width, image.height);
+    let size = (own.0.max(surface.0), own.1.max(surface.1));
+    match (halvings(size, own), halvings(size, surface)) {
+        (Some(of_color), Some(of_surface)) => {
+            Ok(Plan { base, image, metallic, dielectric, of_color, of_surface })
+        }
+        _ => Err(Apart::Sizes(own.0, own.1, surface.0, surface.1)),
+    }
 }
 
 /// Whether a map has two values.

@@ -21,7 +21,7 @@ use self::flags::{Flag, On};
 use crate::init::{MANIFEST, Survey};
 use crate::model::ModelArgs;
 use crate::outputs::{beside, check_folder, has_extension, way};
-use crate::values::{CONTAINERS, Choices, FORMATS, PRESETS, choice, exr_layer, filter, number};
+use crate::values::{CONTAINERS, Choices, FORMATS, PRESETS, SWITCH, choice, exr_layer, filter, number};
 use crate::{Console, Error};
 
 pub use curvature::CurvatureArgs;
@@ -67,6 +67,11 @@ pub struct Args {
     /// Shape of the footprint
     #[arg(long, default_value = "box", value_parser = choice(KERNELS))]
     pub kernel: Kernel,
+
+    /// Filters colour, metalness and lobe together, so that what reflects and what scatters stays from afar; off averages each
+    /// by itself. Of a glTF file it needs --all-textures
+    #[arg(long, value_name = "WHETHER", action = clap::ArgAction::Set, default_value = "on", value_parser = choice(SWITCH))]
+    pub correlated: bool,
 
     /// What lies beyond the borders of a folder's maps; glTF files say it themselves
     #[arg(long, default_value = "wrap", value_parser = choice(EDGES))]
@@ -251,6 +256,7 @@ impl Args {
         (how.normal_format, how.aniso_format, how.color_format) =
             (self.normal_format, self.aniso_format, self.color_format);
         (how.encoder, how.preset) = (self.encoder, self.preset);
+        how.correlated = self.correlated;
         how
     }
 

@@ -113,6 +113,9 @@ pub(crate) const CONTAINERS: &Choices<Container> = &[
     (Container::Both, "both", "Both"),
 ];
 
+/// Whether something is done.
+pub(crate) const SWITCH: &Choices<bool> = &[(true, "on", ""), (false, "off", "")];
+
 /// Time spent on a block.
 pub(crate) const PRESETS: &Choices<Preset> = &[
     (Preset::Fast, "fast", "For previews"),

@@ -59,6 +59,9 @@ pub struct TextureOptions {
     pub filter: Filter,
     /// Shape of the footprint.
     pub kernel: Kernel,
+    /// Whether lobes are weighed by what their texels reflect, and base colour and metalness are chosen together, where their
+    /// maps lie as those of the surface do; they are by default. [`Filter::Naive`] does neither.
+    pub correlated: bool,
     /// File format.
     pub container: Container,
     /// Zstandard level of KTX2 files, 0 for none to 22; 3 by default.
@@ -81,6 +84,7 @@ impl Default for TextureOptions {
         TextureOptions {
             filter: Filter::Ml,
             kernel: Kernel::Box,
+            correlated: true,
             container: Container::Ktx2,
             zstd: 3,
             normal_format: None,
@@ -96,6 +100,11 @@ impl TextureOptions {
     /// How a surface is filtered.
     pub fn surface(&self) -> SurfaceOptions {
         SurfaceOptions { filter: self.filter, kernel: self.kernel }
+    }
+
+    /// Whether colour, metalness and lobes are filtered together.
+    pub(crate) fn is_correlated(&self) -> bool {
+        self.correlated && self.filter != Filter::Naive
     }
 
     /// A map's encoding: the role's measured default, changed by what the options say; `format` is that of its kind of map.

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use glam::Vec3;
 use kinran_image::{Channels, Disk, Files, Image, Pixels, Transfer, decode_layer};
 use kinran_scene::Wrap;
 use kinran_shading::{alpha_from_roughness, alphas_from_khr_anisotropy};
@@ -17,7 +18,10 @@ use super::{
     BaseRoughness, DirectionSource, FolderError, Green, GreenGuess, GreenSource, LevelSource, MapChannel,
     MaterialMaps, NormalSource, Role, RoughnessSource,
 };
-use crate::aniso::{DirectionMap, NormalMap, NormalZ, RoughnessMaps, ScalarMap, SurfaceMaps};
+use crate::aniso::{
+    ColorMap, Dielectric, DirectionMap, NormalMap, NormalZ, Reflectance, ReflectanceMaps, RoughnessMaps,
+    ScalarMap, SurfaceMaps,
+};
 use crate::channels::{Place, read_channel};
 
 /// A file that a material uses.
@@ -50,6 +54,25 @@ pub struct LoadedMaterial {
     pub metallic: Option<(usize, usize)>,
     /// What was assumed and may be wrong, from names and texels; a sentence each that names the material or the file.
     pub notes: Vec<String>,
+}
+
+impl LoadedMaterial {
+    /// What its texels reflect: by base colour and metalness, or by the specular colour beside gloss. `None` where neither is
+    /// there, so that all of it is a dielectric.
+    pub fn reflectance(&self) -> Option<Reflectance> {
+        let of = |role| self.images.iter().find(|map| map.role == role).map(|map| map.image.clone());
+        let color = |image| ColorMap { image, factor: Vec3::ONE };
+        let wrap = self.surface.as_ref()?.wrap;
+        let maps = match self.metallic {
+            Some((i, channel)) => ReflectanceMaps::Metallic {
+                base: color(Some(of(Role::Color)?)),
+                metallic: ScalarMap::channel(self.images[i].image.clone(), channel),
+                dielectric: Dielectric::default(),
+            },
+            None => ReflectanceMaps::Specular(color(Some(of(Role::SpecularSmoothness)?))),
+        };
+        Some(Reflectance { maps, wrap })
+    }
 }
 
 /// Alphas along and across the direction, of a perceptual roughness and a level of anisotropy.

@@ -41,10 +41,11 @@ const fn flag(name: &'static str, on: On, given: fn(&Args) -> bool) -> Flag {
 }
 
 /// Every flag, in the order of `kinran bake --help`.
-pub(super) const FLAGS: [Flag; 41] = [
+pub(super) const FLAGS: [Flag; 42] = [
     flag("output", On::Run, |a| a.output.is_some()),
     flag("filter", On::Any, |a| a.filter.name() != "ml"),
     flag("kernel", On::Any, |a| a.kernel != Kernel::default()),
+    flag("correlated", On::Any, |a| !a.correlated),
     flag("edges", On::Folder, |a| a.edges != Wrap::Repeat),
     flag("form", On::Any, |a| a.form.is_some()),
     flag("container", On::Any, |a| a.container != Container::default()),

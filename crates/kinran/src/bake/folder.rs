@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use kinran_bake::aniso::{Sheet, SheetRequest, bake_surface};
+use kinran_bake::aniso::{Sheet, SheetRequest, bake_surface_and_metal};
 use kinran_bake::folder::{
     ASSUMED_ROUGHNESS, Folder, Hints, LoadedMap, LoadedMaterial, MaterialMaps, Role as MapRole, scan_in,
 };
@@ -10,6 +10,7 @@ use kinran_bake::{bake_plain, pack_channels};
 use kinran_image::{Encoding, Files, Image, Role, Transfer};
 use rayon::prelude::*;
 
+use super::together::{together, why_apart};
 use super::{file_name, file_stem, mip_texels, put_texture};
 use crate::content::Content;
 use crate::options::{Form, TextureOptions};
@@ -82,7 +83,7 @@ pub fn folder(
         let mut report = Report::new(&how.textures);
         report.warnings.clone_from(&loaded.notes);
         report.source.clone_from(&how.source);
-        report.surfaces.push(bake_material(&loaded, how, out, task)?);
+        report.surfaces.push(bake_material(&loaded, how, &mut report.warnings, out, task)?);
         report.write(out, &report_file(&loaded.name), Vec::new())?;
         reports.push(report);
     }
@@ -171,6 +172,7 @@ fn report_file(material: &str) -> String {
 fn bake_material(
     material: &LoadedMaterial,
     how: &FolderOptions,
+    warnings: &mut Vec<String>,
     out: &dyn Sink,
     task: Task<'_>,
 ) -> Result<SurfaceReport, Error> {
@@ -183,8 +185,15 @@ fn bake_material(
     };
     let image = |at: Option<(usize, usize)>| at.map(|(i, channel)| (&*material.images[i].image, channel));
     let (occlusion, metallic) = (image(material.occlusion), image(material.metallic));
+    let mut chosen = None;
 
     if let Some(maps) = &material.surface {
+        let reflectance = material.reflectance().filter(|_| how.textures.is_correlated());
+        let apart = reflectance.as_ref().and_then(|reflectance| why_apart(&material.name, reflectance, maps));
+        warnings.extend(apart);
+        let together = together(maps, reflectance.as_ref(), &name, &how.textures, task)?;
+        chosen = together.color;
+        let (maps, metallic_levels) = (&together.maps, &together.metallic);
         let size = maps.size();
         // One image that holds occlusion and metalness where glTF wants them is packed as it is.
         let packed = match (occlusion, metallic) {
@@ -205,7 +214,10 @@ fn bake_material(
             .collect();
 
         let filtering = task.begin(Stage::Filtering(how.textures.filter), &name, mip_texels(size))?;
-        let baked = bake_surface(maps, how.textures.surface(), &requests, &|texels| filtering.tick(texels))?;
+        let baked =
+            bake_surface_and_metal(maps, how.textures.surface(), &requests, metallic_levels, &|texels| {
+                filtering.tick(texels)
+            })?;
         drop(filtering);
         let writing = task.begin(Stage::Writing, &name, sheets.len() as u64)?;
         report.levels = baked.levels;
@@ -228,7 +240,13 @@ fn bake_material(
     }
 
     if let Some(color) = material.images.iter().find(|map| map.role == MapRole::Color) {
-        report.outputs.extend(bake_map(&name, Content::Color, &color.image, how, out, task)?);
+        report.outputs.extend(match chosen {
+            Some(texture) => {
+                let file = format!("{name}_{}", Content::Color.name());
+                put_texture(&how.textures, &file, Content::Color, texture, out)?
+            }
+            None => bake_map(&name, Content::Color, &color.image, how, out, task)?,
+        });
     }
     Ok(report)
 }

@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use kinran_bake::aniso::{RoughnessMaps, Sheet, SheetRequest, bake_surface};
+use kinran_bake::aniso::{Reflectance, RoughnessMaps, Sheet, SheetRequest, bake_surface_and_metal};
 use kinran_bake::folder::{Green, GreenGuess, below_surface, guess_green, odd_lengths, outside_unit};
-use kinran_bake::{MaterialSurface, NoSurface, bake_plain, material_surface};
+use kinran_bake::metal::apart;
+use kinran_bake::{MaterialSurface, NoSurface, bake_plain, material_reflectance, material_surface};
 use kinran_image::{
     Channels, Encoder, Encoding, Files, Format, Image, Memory, Pixels, Preset, Role, Texture, Transfer,
     decode_image, encode_png, image_size_of,
@@ -15,6 +16,7 @@ use kinran_scene::{
 };
 use serde_json::Value;
 
+use super::together::{together, why_apart};
 use super::{CurvatureOptions, curvature, file_name, file_stem, mip_texels, put_texture};
 use crate::content::Content;
 use crate::options::{Form, TextureOptions};
@@ -84,7 +86,17 @@ pub struct Surface {
     pub materials: Vec<usize>,
     /// Their maps.
     pub maps: MaterialSurface,
+    /// What they reflect, where that differs from texel to texel and their maps are filtered together.
+    pub reflectance: Option<Reflectance>,
     key: Key,
+}
+
+impl Surface {
+    /// Whether levels of its base colour and metalness are chosen together.
+    fn is_chosen_together(&self) -> bool {
+        let size = self.maps.maps.size();
+        self.reflectance.as_ref().is_some_and(|reflectance| apart(reflectance, size).is_none())
+    }
 }
 
 impl Understood {
@@ -158,22 +170,28 @@ pub fn gltf(
     if there.is_some() && files.place(input) == there {
         return Err(Error::OverInput { input: input.into() });
     }
-    let Understood { scene, mut document, surfaces, warnings } = understand_gltf(files, input, how, task)?;
-    let mut report = Report { warnings, source: how.source.clone(), ..Report::new(&how.textures) };
+    let Understood { scene, mut document, surfaces, mut warnings } =
+        understand_gltf(files, input, how, task)?;
     let stem = input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-    let plan = Plan::new(how, &scene, &document, &surfaces, &stem);
+    let mut plan = Plan::new(how, &scene, &document, &surfaces, &stem);
+    warnings.append(&mut plan.notes);
+    let mut report = Report { warnings, source: how.source.clone(), ..Report::new(&how.textures) };
     check(input, how, &scene, &document, &surfaces, &plan, out)?;
 
     let mut written = Vec::new();
-    for (surface, (name, planned)) in surfaces.iter().zip(&plan.surfaces) {
+    for (i, (surface, (name, planned))) in surfaces.iter().zip(&plan.surfaces).enumerate() {
         let (scene, document, name, written) = (&scene, &mut document, name.clone(), &mut written);
         let mut baker = SurfaceBaker { how, scene, document, name, written, out, task };
-        report.surfaces.push(baker.bake(surface, planned)?);
+        let (of_surface, chosen) = baker.bake(surface, planned)?;
+        report.surfaces.push(of_surface);
+        if let Some(color) = plan.colors.iter_mut().find(|color| color.surface == Some(i)) {
+            color.chosen = chosen;
+        }
     }
     for turned in &plan.turned {
         turn_green(input, &mut document, turned, &mut written, out)?;
     }
-    bake_colors(how, &scene, &mut document, &plan.colors, &mut report, out, task)?;
+    bake_colors(how, &scene, &mut document, plan.colors, &mut report, out, task)?;
     let dumps = curvature::bake(input, how, &scene, &mut document, &mut report, out, task)?;
 
     for (i, material) in scene.materials.iter().enumerate().take(document.material_count()) {
@@ -221,6 +239,8 @@ struct Plan {
     surfaces: Vec<(String, Vec<Planned>)>,
     colors: Vec<Colored>,
     turned: Vec<Turned>,
+    /// What should be told, a sentence each.
+    notes: Vec<String>,
 }
 
 /// A normal map that is not filtered, and whose green is turned over.
@@ -239,6 +259,10 @@ struct Colored {
     name: String,
     place: TextureRef,
     transfer: Transfer,
+    /// The surface whose metalness it is chosen together with.
+    surface: Option<usize>,
+    /// What came of that.
+    chosen: Option<Texture>,
     /// The materials that use it, and where.
     slots: Vec<(usize, Slot)>,
 }
@@ -266,7 +290,7 @@ impl Plan {
             (name, planned(scene, material, &surface.maps))
         });
         let surfaces = surfaces.collect();
-        let mut colors: Vec<Colored> = Vec::new();
+        let (mut colors, mut notes) = (Vec::<Colored>::new(), Vec::new());
         let materials = document.material_count().min(scene.materials.len());
         for material in (0..materials).filter(|_| how.all_textures) {
             let m = &scene.materials[material];
@@ -277,7 +301,11 @@ impl Plan {
                 (Slot::Occlusion, occlusion, Transfer::Linear),
             ] {
                 let Some(place) = place.filter(|place| scene.images[place.image].is_some()) else { continue };
-                let known = colors.iter_mut().find(|c| c.place == *place && c.transfer == transfer);
+                let is_chosen =
+                    |surface: &Surface| surface.materials.contains(&material) && surface.is_chosen_together();
+                let surface = all.iter().position(is_chosen).filter(|_| slot == Slot::BaseColor);
+                let is_it = |c: &&mut Colored| c.place == *place && c.transfer == transfer;
+                let known = colors.iter_mut().filter(is_it).find(|c| c.surface == surface);
                 match known {
                     Some(known) => known.slots.push((material, slot)),
                     None => {
@@ -285,9 +313,18 @@ impl Plan {
                             name: String::new(),
                             place: place.clone(),
                             transfer,
+                            surface,
+                            chosen: None,
                             slots: vec![(material, slot)],
                         };
                         let image = file_stem(&document.image_name(place.image));
+                        if let Some(other) = colors.iter_mut().find(is_it) {
+                            let other = &scene.materials[other.slots[0].0].name;
+                            notes.push(format!(
+                                "the base colour of \"{other}\" and \"{}\" becomes two textures, since their metalness differs",
+                                m.name
+                            ));
+                        }
                         color.name = names.unique(&format!("{stem}_{image}_{}", color.content().name()));
                         colors.push(color);
                     }
@@ -315,7 +352,7 @@ impl Plan {
                 });
             }
         }
-        Plan { surfaces, colors, turned }
+        Plan { surfaces, colors, turned, notes }
     }
 }
 
@@ -505,11 +542,25 @@ fn surfaces(
             // Factors alone need no texture.
             Ok(surface) if surface.place.is_none() => {}
             Ok(mut maps) => {
-                let key = Key::new(scene, material);
+                let mut key = Key::new(scene, material);
                 maps.maps.normal.y_down = how.green == Some(Green::Down);
+                let is_asked = how.all_textures && how.textures.is_correlated();
+                let reflectance = match material_reflectance(scene, material, &maps) {
+                    // Where all reflects the same, materials of other colours share their surface.
+                    Ok(of) => of.filter(|of| is_asked && of.weights(maps.maps.size()).is_some()),
+                    Err(reason) => {
+                        warnings.extend(is_asked.then_some(reason));
+                        None
+                    }
+                };
+                if let Some(reflectance) = &reflectance {
+                    key.color = Key::of_color(&scene.materials[material]);
+                    let name = format!("material \"{}\"", scene.materials[material].name);
+                    warnings.extend(why_apart(&name, reflectance, &maps.maps));
+                }
                 match surfaces.iter_mut().find(|known| known.key == key) {
                     Some(known) => known.materials.push(material),
-                    None => surfaces.push(Surface { materials: vec![material], maps, key }),
+                    None => surfaces.push(Surface { materials: vec![material], maps, reflectance, key }),
                 }
             }
             Err(NoSurface::Plain) => {}
@@ -593,9 +644,15 @@ struct Key {
     roughness: f32,
     anisotropy: Option<(f32, f32)>,
     occlusion_packed: bool,
+    /// Base colour and factors, where the surface is filtered with what it reflects.
+    color: Option<(TextureRef, [f32; 3], f32)>,
 }
 
 impl Key {
+    fn of_color(m: &Material) -> Option<(TextureRef, [f32; 3], f32)> {
+        Some((m.base_color.clone()?, m.base_color_factor.truncate().to_array(), m.metallic_factor))
+    }
+
     fn new(scene: &Scene, material: usize) -> Self {
         let m = &scene.materials[material];
         let anisotropy = m.anisotropy.as_ref().filter(|a| a.strength > 0.0);
@@ -609,6 +666,7 @@ impl Key {
             roughness: m.roughness_factor,
             anisotropy: anisotropy.map(|a| (a.strength, a.rotation)),
             occlusion_packed: occlusion_is_packed(scene, material),
+            color: None,
         }
     }
 }
@@ -658,10 +716,17 @@ struct Planned {
 }
 
 impl SurfaceBaker<'_> {
-    fn bake(&mut self, surface: &Surface, planned: &[Planned]) -> Result<SurfaceReport, Error> {
+    /// Bakes a surface; gives its base colour too, where that is chosen together with its metalness.
+    fn bake(
+        &mut self,
+        surface: &Surface,
+        planned: &[Planned],
+    ) -> Result<(SurfaceReport, Option<Texture>), Error> {
         let (options, materials) = (&self.how.textures, surface.materials.as_slice());
         let m = &self.scene.materials[materials[0]];
-        let maps = &surface.maps.maps;
+        let reflectance = surface.reflectance.as_ref();
+        let together = together(&surface.maps.maps, reflectance, &m.name, options, self.task)?;
+        let (maps, metallic) = (&together.maps, &together.metallic);
         let size = maps.size();
         let mr = m.metallic_roughness.as_ref().and_then(|place| self.scene.images[place.image].clone());
 
@@ -693,7 +758,9 @@ impl SurfaceBaker<'_> {
         }
 
         let filtering = self.task.begin(Stage::Filtering(options.filter), &m.name, mip_texels(size))?;
-        let baked = bake_surface(maps, options.surface(), &requests, &|texels| filtering.tick(texels))?;
+        let baked = bake_surface_and_metal(maps, options.surface(), &requests, metallic, &|texels| {
+            filtering.tick(texels)
+        })?;
         drop(filtering);
         let writing = self.task.begin(Stage::Writing, &m.name, baked.textures.len() as u64)?;
 
@@ -718,7 +785,7 @@ impl SurfaceBaker<'_> {
             self.place_aniso(&outputs, materials);
             report.outputs.extend(outputs);
         }
-        Ok(report)
+        Ok((report, together.color))
     }
 
     /// Writes a texture and puts it into its slot of every material.
@@ -874,7 +941,7 @@ fn bake_colors(
     how: &GltfOptions,
     scene: &Scene,
     document: &mut Document,
-    colors: &[Colored],
+    colors: Vec<Colored>,
     report: &mut Report,
     out: &dyn Sink,
     task: Task<'_>,
@@ -882,13 +949,20 @@ fn bake_colors(
     let image = |color: &Colored| scene.images[color.place.image].as_ref();
     let texels = colors.iter().filter_map(image).map(|image| mip_texels((image.width, image.height)));
     let averaging = task.begin(Stage::Colors, "", texels.sum())?;
-    for color in colors {
+    for mut color in colors {
+        let chosen = color.chosen.take();
         let (place, content) = (&color.place, color.content());
         let Some(image) = &scene.images[place.image] else { continue };
         let (kernel, encoding) = (how.textures.kernel, color.encoding(&how.textures));
-        let texture = bake_plain(image, color.transfer, encoding, kernel, place.wrap, &|texels| {
-            averaging.tick(texels)
-        })?;
+        let texture = match chosen {
+            Some(texture) => {
+                averaging.tick(mip_texels((image.width, image.height)))?;
+                texture
+            }
+            None => bake_plain(image, color.transfer, encoding, kernel, place.wrap, &|texels| {
+                averaging.tick(texels)
+            })?,
+        };
         let outputs = put_texture(&how.textures, &color.name, content, texture, out)?;
         let (material, slot) = color.slots[0];
         let old = document.texture(material, slot);

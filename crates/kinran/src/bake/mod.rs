@@ -3,6 +3,7 @@
 mod curvature;
 mod folder;
 mod gltf;
+mod together;
 
 use std::path::Path;
 

@@ -1,0 +1,61 @@
+//! Colour, metalness and lobe of a surface, filtered together.
+
+use std::sync::Arc;
+
+use kinran_bake::aniso::{Reflectance, SurfaceMaps};
+use kinran_bake::compress_levels;
+use kinran_bake::metal::{Apart, apart, base_and_metal};
+
+use kinran_image::{Role, Texture, Transfer};
+
+use super::mip_texels;
+use crate::content::Content;
+use crate::options::TextureOptions;
+use crate::{Error, Stage, Task};
+
+/// A surface that knows what it reflects.
+pub(super) struct Together {
+    /// Its maps, with weights where its texels do not all reflect the same.
+    pub(super) maps: SurfaceMaps,
+    /// Base colour, where its levels are chosen together with those of metalness.
+    pub(super) color: Option<Texture>,
+    /// Levels of metalness; none where they are averaged.
+    pub(super) metallic: Vec<Vec<u8>>,
+}
+
+/// Filters base colour and metalness of a surface, and weighs its texels; as it is where nothing is said of what it reflects.
+pub(super) fn together(
+    maps: &SurfaceMaps,
+    reflectance: Option<&Reflectance>,
+    name: &str,
+    how: &TextureOptions,
+    task: Task<'_>,
+) -> Result<Together, Error> {
+    let mut together = Together { maps: maps.clone(), color: None, metallic: Vec::new() };
+    let Some(reflectance) = reflectance else { return Ok(together) };
+    let surface = maps.size();
+    together.maps.weights = reflectance.weights(surface).map(Arc::new);
+    if apart(reflectance, surface).is_none() {
+        let own = reflectance.size();
+        let size = (own.0.max(surface.0), own.1.max(surface.1));
+        let choosing = task.begin(Stage::Averaging(Content::Color), name, mip_texels(size))?;
+        let pair = match base_and_metal(reflectance, surface, how.kernel, &|texels| choosing.tick(texels)) {
+            Ok(pair) => pair,
+            Err(Apart::Cancelled(stopped)) => return Err(stopped.into()),
+            Err(_) => return Ok(together),
+        };
+        choosing.expect(pair.color.iter().map(|level| level.rgba8.len() as u64 / 4).sum());
+        let encoding = how.encoding(Role::Color, how.color_format);
+        let tick = |texels| choosing.tick(texels);
+        together.color = Some(compress_levels(&pair.color, Transfer::Srgb, encoding, &tick)?);
+        together.metallic = pair.metallic;
+    }
+    Ok(together)
+}
+
+/// A sentence where base colour and metalness are averaged one by one though both vary.
+pub(super) fn why_apart(name: &str, reflectance: &Reflectance, maps: &SurfaceMaps) -> Option<String> {
+    let apart = apart(reflectance, maps.size())?;
+    let is_loss = matches!(apart, Apart::Dielectric | Apart::Sizes(..));
+    is_loss.then(|| format!("{name}: base colour and metalness are averaged one by one: {apart}"))
+}
