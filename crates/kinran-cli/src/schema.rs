@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::bake::{LibraryReport, report::BakeReport};
 use crate::{
     cache, compare, completions, console, demo, detail, fit, fuzz_sheet, init, inspect, render, shaders,
-    skin_lut, skin_sheet,
+    skin_sheet,
 };
 
 /// A schema for each command, by its name; `error` is that of what any of them prints in the place of a result.
@@ -29,7 +29,7 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
         of::<render::Summary>("render", "kinran render"),
         of::<shaders::Report>("shaders", "kinran shaders"),
         of::<skin_sheet::Summary>("skin", "kinran skin"),
-        of::<skin_lut::Report>("skin-lut", "kinran skin-lut"),
+        of::<kinran::skin::TablesReport>("skin-lut", "kinran skin-lut"),
         #[cfg(feature = "view")]
         of::<crate::viewer::Summary>("view", "kinran view --screenshot"),
     ]

@@ -5,25 +5,15 @@ mod profile_file;
 
 use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
-use kinran::content::Content;
 use kinran::options::Container;
-use kinran::report::{WrittenFile, kept_files};
-use kinran::{OutputFolder, Space};
-use kinran_bake::skin_lut::{
-    INTERPOLATION_GRID, Profile, Table, TableFormat, ambient_table, penumbra_table,
-    punctual_interpolation_error, punctual_table,
-};
-use kinran_image::{Texture, encode_dds, encode_ktx2, write_atomically};
-use kinran_shading::skin::profile::{Gaussian, ProfileError};
-use schemars::JsonSchema;
-use serde::Serialize;
+use kinran::skin::{TableOptions, tables};
+use kinran::{Sink, Space};
+use kinran_bake::skin_lut::{Profile, TableFormat};
+use kinran_shading::skin::profile::ProfileError;
 
-use crate::outputs::{
-    beside, check_folder, check_space, kept_remark, refuse_foreign, refuse_input, replaced_bytes, tell_place,
-    written_file,
-};
-use crate::values::{CONTAINERS, choice, number, size};
+use crate::outputs::{Output, beside, check_folder, kept_remark, refuse_input, tell_place, written_file};
+use crate::progress::Bars;
+use crate::values::{CONTAINERS, Choices, choice, number, size};
 use crate::{Console, Error};
 
 /// Makes the tables that skin is lit with
@@ -87,8 +77,8 @@ pub struct Args {
     pub range: f32,
 
     /// Texels and their encoding
-    #[arg(long, value_enum, default_value_t)]
-    pub format: FormatName,
+    #[arg(long, default_value = "rgba16f", value_parser = choice(TABLE_FORMATS))]
+    pub format: TableFormat,
 
     /// File format of the tables
     #[arg(long, default_value = "ktx2", value_parser = choice(CONTAINERS))]
@@ -104,16 +94,11 @@ pub struct Args {
 }
 
 /// Texels and their encoding.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum FormatName {
-    /// Half floats
-    #[default]
-    Rgba16f,
-    /// Bytes, sRGB: the sampler decodes, small values get most codes
-    Srgb8,
-    /// Bytes, as they are
-    Rgba8,
-}
+const TABLE_FORMATS: &Choices<TableFormat> = &[
+    (TableFormat::Rgba16F, "rgba16f", "Half floats"),
+    (TableFormat::Srgb8, "srgb8", "Bytes, sRGB: the sampler decodes, small values get most codes"),
+    (TableFormat::Linear8, "rgba8", "Bytes, as they are"),
+];
 
 impl Args {
     /// Where the files go.
@@ -121,10 +106,16 @@ impl Args {
         let nowhere = || self.profile.as_ref().map_or_else(|| "baked".into(), |file| beside(file, "baked"));
         self.output.clone().unwrap_or_else(nowhere)
     }
-}
 
-/// Texels along the sides of the table of penumbras, at most; chosen by eye.
-const PENUMBRA: u64 = 64;
+    /// What the flags say.
+    fn options(&self) -> TableOptions {
+        let mut how = TableOptions::default();
+        how.name.clone_from(&self.name);
+        (how.size, how.range, how.scale, how.penumbra) = (self.size, self.range, self.scale, self.penumbra);
+        (how.format, how.container) = (self.format, self.container);
+        how
+    }
+}
 
 fn triple(text: &str) -> Result<[f64; 3], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse::<f64>()).collect();
@@ -141,44 +132,9 @@ fn table_size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-/// What was made.
-#[derive(Debug, Serialize, JsonSchema)]
-pub(crate) struct Report {
-    kinran: &'static str,
-    profile: String,
-    scale: f32,
-    /// 1/mm at the lower edge of the punctual table and the right edge of the ambient one.
-    range: f32,
-    tables: Vec<TableReport>,
-    /// Every file that was written beside this report.
-    written: Vec<WrittenFile>,
-    /// What earlier runs wrote beside it, under other flags, and is there as they left it.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    kept: Vec<WrittenFile>,
-}
-
-/// A table.
-#[derive(Debug, Serialize, JsonSchema)]
-struct TableReport {
-    files: Vec<String>,
-    width: usize,
-    height: usize,
-    format: &'static str,
-    across: &'static str,
-    down: &'static str,
-    /// Largest error of a texel after encoding.
-    encoding_error: f32,
-    /// Largest error between texels, before encoding.
-    interpolation_error: Option<f32>,
-}
-
 /// Bytes that the tables will take.
 pub(crate) fn space(args: &Args) -> Space {
-    let texel = if args.format == FormatName::Rgba16f { 8 } else { 4 };
-    let (width, height) = (u64::from(args.size.0), u64::from(args.size.1));
-    let penumbra = if args.penumbra { width.min(PENUMBRA) * height.min(PENUMBRA) } else { 0 };
-    let texels = width * height + 2 * width + penumbra;
-    Space::exact(texels * texel * args.container.extensions().len() as u64)
+    args.options().plan().1
 }
 
 /// Runs the command.
@@ -197,65 +153,30 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         Some(file) => Error::file_error(file, error.to_string()),
         None => Error::flag_error(profile_flag(args), error),
     };
-    let radial = profile.radial().map_err(refuse)?;
-    check_folder(&args.output())?;
-    let mut files: Vec<String> = Vec::new();
-    let penumbra = args.penumbra.then_some(Content::SkinPenumbra);
-    for content in [Content::SkinPunctual, Content::SkinAmbient].into_iter().chain(penumbra) {
-        files.extend(args.container.extensions().iter().map(|e| table_file(args, content, e)));
-    }
-    files.push(format!("{}.png", args.name));
-    let sidecar = format!("{}.kinran.json", args.name);
-    let all: Vec<String> = files.iter().chain([&sidecar]).cloned().collect();
+    profile.radial().map_err(refuse)?;
+    let (output, how) = (args.output(), args.options());
+    check_folder(&output)?;
+    let plot_file = format!("{}.png", args.name);
+    let (tables_files, space) = how.plan();
+    let all: Vec<String> = tables_files.into_iter().chain([plot_file.clone(), how.report()]).collect();
     for file in &all {
-        refuse_input(&args.output().join(file), args.profile.as_deref())?;
+        refuse_input(&output.join(file), args.profile.as_deref())?;
     }
-    refuse_foreign(&args.output(), &all, args.force)?;
-    let needed = space(args).beyond(replaced_bytes(&args.output(), &all));
-    if let Some(warning) = check_space(&args.output(), needed)? {
-        console.warn(warning);
-    }
-    std::fs::create_dir_all(args.output()).map_err(|e| kinran_image::Error::io(args.output(), e))?;
-
-    let (width, height) = (args.size.0 as usize, args.size.1 as usize);
-    let range = f64::from(args.range);
-    let points = width * height * (1 + INTERPOLATION_GRID * INTERPOLATION_GRID);
-    let stage = console.progress().stage("integrating tables", points as u64);
-    let tick = |points| stage.tick(points);
-    let punctual = punctual_table(radial, width, height, range, &tick)?;
-    let ambient = ambient_table(radial, width, range);
-    let error = punctual_interpolation_error(radial, &punctual, range, &tick)?;
-
-    let mut report = Report {
-        kinran: env!("CARGO_PKG_VERSION"),
-        profile: described,
-        scale: args.scale,
-        range: args.range,
-        tables: Vec::new(),
-        written: Vec::new(),
-        kept: Vec::new(),
+    let out = Output {
+        folder: &output,
+        input: args.profile.as_deref().unwrap_or(Path::new("")),
+        force: args.force,
+        console,
     };
-    let mut add = |content, table: &Table, across, down, interpolation_error| -> Result<(), Error> {
-        report.tables.push(write_table(args, content, table, across, down, interpolation_error)?);
-        Ok(())
-    };
-    add(Content::SkinPunctual, &punctual, "n·u from -1 to 1", "curvature from 0 to range", Some(error))?;
-    add(Content::SkinAmbient, &ambient, "mean curvature from 0 to range", "band 1, band 2", None)?;
-    if args.penumbra {
-        let table = penumbra_table(radial, width.min(PENUMBRA as usize), height.min(PENUMBRA as usize), 1.0);
-        let down = "one over the penumbra's width from 0 to 1/mm";
-        add(Content::SkinPenumbra, &table, "filtered shadow from 0 to 1", down, None)?;
-    }
-    let title = format!("{}, {}", args.name, report.profile);
-    plot::plot(&title, &punctual, &ambient, args.range)
-        .write(&args.output().join(format!("{}.png", args.name)))?;
-    report.written = files.iter().map(|file| written_file(&args.output(), file)).collect::<Result<_, _>>()?;
-    report.kept = kept_files(&OutputFolder::new(args.output()), &sidecar, &report.written);
-    let mut text = serde_json::to_string_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
-    text.push('\n');
-    write_atomically(&args.output().join(sidecar), text.as_bytes())?;
+    out.expect(&all, space)?;
 
-    drop(stage);
+    let bars = Bars::new(console.progress());
+    let mut made = tables(&profile, &described, &how, &out, bars.task())?;
+    let title = format!("{}, {}", args.name, made.report.profile);
+    plot::plot(&title, &made.punctual, &made.ambient, args.range).write(&output.join(&plot_file))?;
+    made.write_report(&how, vec![written_file(&output, plot_file)?], &out)?;
+    let report = made.report;
+
     let mut lines = String::new();
     for table in &report.tables {
         let between = table
@@ -270,10 +191,10 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             table.encoding_error
         );
     }
-    lines += &format!("{}\n", args.output().join(format!("{}.png", args.name)).display());
+    lines += &format!("{}\n", output.join(format!("{}.png", args.name)).display());
     lines += &kept_remark(&report.kept);
     console.result(&report, &lines)?;
-    tell_place(console, args.output.as_deref(), &args.output());
+    tell_place(console, args.output.as_deref(), &output);
     Ok(())
 }
 
@@ -286,76 +207,22 @@ fn profile_flag(args: &Args) -> &'static str {
     }
 }
 
-/// The profile that the flags name, and what it is called.
+/// The profile that the flags name, and what it is called; `--scale` is for who makes tables of it.
 fn profile(args: &Args) -> Result<(Profile, String), Error> {
-    let k = f64::from(args.scale);
-    let scaled = |d: [f64; 3]| d.map(|d| d * k);
     let list = |d: [f64; 3]| format!("{}, {}, {}", d[0], d[1], d[2]);
     if let Some(d) = args.burley {
-        return Ok((Profile::Burley(scaled(d)), format!("Burley, d = {} mm", list(d))));
+        return Ok((Profile::Burley(d), format!("Burley, d = {} mm", list(d))));
     }
     if let (Some(path), Some(albedo)) = (args.mean_free_path, args.albedo) {
         let described = format!("Burley, mean free path {} mm, albedo {}", list(path), list(albedo));
-        return Ok((Profile::MeanFreePath { path: scaled(path), albedo }, described));
+        return Ok((Profile::MeanFreePath { path, albedo }, described));
     }
-    let (profile, described) = match &args.profile {
+    Ok(match &args.profile {
         Some(file) => (profile_file::read(file)?, file_name(file)),
         None => (Profile::default(), "human skin, six Gaussians".to_owned()),
-    };
-    // Densities are normalised later: only lengths matter.
-    let profile = match profile {
-        Profile::Gaussians(sum) => Profile::Gaussians(
-            sum.into_iter().map(|g| Gaussian { variance: g.variance * k * k, ..g }).collect(),
-        ),
-        Profile::Table(rows) => Profile::Table(rows.into_iter().map(|(r, d)| (r * k, d)).collect()),
-        other => other,
-    };
-    Ok((profile, described))
+    })
 }
 
 fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
-}
-
-/// The name of a table's file: `skin_punctual.ktx2` where `--name` is `skin`.
-fn table_file(args: &Args, content: Content, extension: &str) -> String {
-    format!("{}_{}.{extension}", args.name, content.name().trim_start_matches("skin-"))
-}
-
-fn write_table(
-    args: &Args,
-    content: Content,
-    table: &Table,
-    across: &'static str,
-    down: &'static str,
-    interpolation_error: Option<f32>,
-) -> Result<TableReport, Error> {
-    let (format, label) = match args.format {
-        FormatName::Rgba16f => (TableFormat::Rgba16F, "rgba16f"),
-        FormatName::Srgb8 => (TableFormat::Srgb8, "srgb8"),
-        FormatName::Rgba8 => (TableFormat::Linear8, "rgba8"),
-    };
-    let mut texture: Texture = table.texture(format)?;
-    content.mark(&mut texture);
-    texture.metadata.insert("KinranRange".into(), args.range.to_string());
-    let mut files = Vec::new();
-    for extension in args.container.extensions() {
-        let file = table_file(args, content, extension);
-        let bytes = match *extension {
-            "dds" => encode_dds(&texture)?,
-            _ => encode_ktx2(&texture, None)?,
-        };
-        write_atomically(&args.output().join(&file), &bytes)?;
-        files.push(file);
-    }
-    Ok(TableReport {
-        files,
-        width: table.width,
-        height: table.height,
-        format: label,
-        across,
-        down,
-        encoding_error: table.texture_error(&texture)?,
-        interpolation_error,
-    })
 }

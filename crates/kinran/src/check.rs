@@ -108,9 +108,11 @@ impl Findings {
         let (width, height) = (texture.levels[0].width, texture.levels[0].height);
         let is_table =
             matches!(content, Content::SkinPunctual | Content::SkinAmbient | Content::SkinPenumbra);
-        let wanted = if is_table { 1 } else { full_level_count(width, height) };
-        if texture.levels.len() != wanted {
-            let found = texture.levels.len();
+        let (found, wanted) =
+            (texture.levels.len(), if is_table { 1 } else { full_level_count(width, height) });
+        // DDS files have no keys: a single level may be a table.
+        let may_be_table = slot.is_none() && !texture.metadata.contains_key(Content::KEY) && found == 1;
+        if found != wanted && !may_be_table {
             self.add(place, format!("has {found} levels; {width}x{height} texels want {wanted}"));
         }
         if is_table {

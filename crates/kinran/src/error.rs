@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 use kinran_bake::curvature::CurvatureError;
 use kinran_bake::folder::FolderError;
 use kinran_image::Cancelled;
+use kinran_shading::skin::profile::ProfileError;
 
 /// Why a task failed. The message is one line: what is wrong where, and what to do about it.
 #[derive(Debug, thiserror::Error)]
@@ -83,6 +84,9 @@ pub enum Error {
         /// Why.
         error: CurvatureError,
     },
+    /// A diffusion profile cannot be one.
+    #[error("the profile: {0}")]
+    Profile(ProfileError),
     /// A normal map that should be turned over cannot be read.
     #[error("{}: its normal map cannot be turned over: {error}", input.display())]
     Unturned {
@@ -153,7 +157,7 @@ impl Error {
             Error::Scene(kinran_scene::Error::Malformed { .. }) => "malformed",
             Error::Scene(kinran_scene::Error::Unsupported { .. }) => "unsupported",
             Error::Scene(kinran_scene::Error::Outside { .. }) => "input",
-            Error::Option { .. } | Error::Folder(FolderError::Flag { .. }) => "option",
+            Error::Option { .. } | Error::Profile(_) | Error::Folder(FolderError::Flag { .. }) => "option",
             Error::Folder(FolderError::NotAFolder(_)) => "input",
             Error::Folder(_) => "maps",
             Error::OverInput { .. } | Error::OverMap { .. } | Error::SameName { .. } => "input",

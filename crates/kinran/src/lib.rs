@@ -35,6 +35,7 @@ mod error;
 pub mod options;
 pub mod report;
 mod sink;
+pub mod skin;
 mod task;
 
 pub use check::{Finding, check};

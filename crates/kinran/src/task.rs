@@ -61,6 +61,8 @@ pub enum Stage {
     Normals,
     /// Meshes are measured; units are triangles.
     Curvature,
+    /// Tables of skin are integrated; units are points.
+    Tables,
     /// Files are written.
     Writing,
 }
@@ -91,6 +93,7 @@ impl fmt::Display for Progress<'_> {
             Stage::Colors => write!(f, "colour, emission, occlusion")?,
             Stage::Normals => write!(f, "normals")?,
             Stage::Curvature => write!(f, "curvature")?,
+            Stage::Tables => write!(f, "integrating tables")?,
             Stage::Writing => write!(f, "writing")?,
         }
         if self.of.is_empty() { Ok(()) } else { write!(f, " {}", self.of) }

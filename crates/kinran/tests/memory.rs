@@ -10,7 +10,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use common::{maps, model, png};
 use kinran::bake::{FolderOptions, GltfOptions, Which, folder, gltf, understand};
 use kinran::options::{Container, Form};
-use kinran::{Cancel, Disk, Error, Files, Memory, OutputFolder, Progress, Sink, Task};
+use kinran::skin::{TableOptions, tables};
+use kinran::{Cancel, Disk, Error, Files, Memory, OutputFolder, Progress, Sink, Task, check};
+use kinran_bake::skin_lut::Profile;
 use kinran_image::{Channels, Encoder};
 
 /// The files in a folder of a disk, by their paths in it.
@@ -94,6 +96,21 @@ fn a_model_in_memory_reads_what_lies_outside_of_its_folder() {
     let files: Memory = files.into_iter().collect();
     let error = bake_model(&files, Path::new(""), &Memory::new(), Task::QUIET).unwrap_err();
     assert_eq!(error.code(), "input", "{error}");
+}
+
+#[test]
+fn tables_of_skin_break_the_rules_for_tables() {
+    let (mut how, out) = (TableOptions::default(), Memory::new());
+    (how.size, how.penumbra, how.container) = ((16, 8), true, Container::Both);
+    let mut made = tables(&Profile::Burley([1.0, 0.5, 0.3]), "Burley", &how, &out, Task::QUIET).unwrap();
+    made.write_report(&how, Vec::new(), &out).unwrap();
+    let (names, _) = how.plan();
+    assert_eq!(made.report.written.iter().map(|w| w.file.clone()).collect::<Vec<_>>(), names);
+    for name in names.iter().map(String::as_str).chain(["skin.kinran.json"]) {
+        assert_eq!(check(&out, name.as_ref()).unwrap(), [], "{name}");
+    }
+    let none = tables(&Profile::Burley([0.0; 3]), "none", &how, &Memory::new(), Task::QUIET);
+    assert!(matches!(none, Err(Error::Profile(_))), "{none:?}");
 }
 
 #[test]

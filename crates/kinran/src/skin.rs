@@ -1,0 +1,256 @@
+//! The tables that skin is lit with.
+
+use kinran_bake::skin_lut::{
+    INTERPOLATION_GRID, Profile, Table, TableFormat, ambient_table, penumbra_table,
+    punctual_interpolation_error, punctual_table,
+};
+use kinran_image::{encode_dds, encode_ktx2};
+use kinran_shading::skin::profile::Gaussian;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::content::Content;
+use crate::options::Container;
+use crate::report::{WrittenFile, kept_files};
+use crate::{Error, Sink, Space, Stage, Task};
+
+/// Which tables are made.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct TableOptions {
+    /// What the files' names begin with; "skin" by default.
+    pub name: String,
+    /// Texels of the punctual table, 2 to 4096 along a side; 512 by default.
+    pub size: (u32, u32),
+    /// Largest curvature, 1/mm, that of the meshes' codes; 0.5 by default.
+    pub range: f32,
+    /// Multiplies all lengths of the profile; 1 by default.
+    pub scale: f32,
+    /// Texels and their encoding; half floats by default.
+    pub format: TableFormat,
+    /// File format.
+    pub container: Container,
+    /// Whether light that scatters into penumbras gets a table too.
+    pub penumbra: bool,
+}
+
+impl Default for TableOptions {
+    fn default() -> Self {
+        TableOptions {
+            name: "skin".into(),
+            size: (512, 512),
+            range: 0.5,
+            scale: 1.0,
+            format: TableFormat::default(),
+            container: Container::default(),
+            penumbra: false,
+        }
+    }
+}
+
+/// Texels along the sides of the table of penumbras, at most; chosen by eye.
+const PENUMBRA: u32 = 64;
+
+impl TableOptions {
+    /// The name of a table's file: `skin_punctual.ktx2`.
+    fn file(&self, content: Content, extension: &str) -> String {
+        format!("{}_{}.{extension}", self.name, content.name().trim_start_matches("skin-"))
+    }
+
+    /// The name of the report.
+    pub fn report(&self) -> String {
+        format!("{}.kinran.json", self.name)
+    }
+
+    /// The files that [`tables`] will write, without the report, and the bytes that they will take.
+    pub fn plan(&self) -> (Vec<String>, Space) {
+        let penumbra = self.penumbra.then_some(Content::SkinPenumbra);
+        let contents = [Content::SkinPunctual, Content::SkinAmbient].into_iter().chain(penumbra);
+        let extensions = self.container.extensions();
+        let files = contents.flat_map(|content| extensions.iter().map(move |e| self.file(content, e)));
+        let texel = if self.format == TableFormat::Rgba16F { 8 } else { 4 };
+        let (width, height) = self.size;
+        let penumbra =
+            if self.penumbra { u64::from(width.min(PENUMBRA)) * u64::from(height.min(PENUMBRA)) } else { 0 };
+        let texels = u64::from(width) * u64::from(height) + 2 * u64::from(width) + penumbra;
+        (files.collect(), Space::exact(texels * texel * extensions.len() as u64))
+    }
+}
+
+/// What was made.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Report")]
+pub struct TablesReport {
+    /// Kinran's version.
+    pub kinran: &'static str,
+    /// What the profile is called.
+    pub profile: String,
+    /// What multiplied all its lengths.
+    pub scale: f32,
+    /// 1/mm at the lower edge of the punctual table and the right edge of the ambient one.
+    pub range: f32,
+    /// The tables.
+    pub tables: Vec<TableReport>,
+    /// Every file that was written beside this report.
+    pub written: Vec<WrittenFile>,
+    /// What earlier runs wrote beside it, under other flags, and is there as they left it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub kept: Vec<WrittenFile>,
+}
+
+/// A table.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct TableReport {
+    /// Its files.
+    pub files: Vec<String>,
+    /// Texels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Texels and their encoding.
+    pub format: &'static str,
+    /// What changes along a row.
+    pub across: &'static str,
+    /// What changes from row to row.
+    pub down: &'static str,
+    /// Largest error of a texel after encoding.
+    pub encoding_error: f32,
+    /// Largest error between texels, before encoding.
+    pub interpolation_error: Option<f32>,
+}
+
+/// Tables before their compression, and what is known of their files.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Tables {
+    /// What part of a punctual light leaves skin: across, n·u from -1 to 1; down, curvature from 0 to the range.
+    pub punctual: Table,
+    /// What remains of bands 1 and 2 of ambient light's harmonics: across, mean curvature from 0 to the range.
+    pub ambient: Table,
+    /// What was made; its [`TablesReport::written`] are the tables.
+    pub report: TablesReport,
+}
+
+/// Integrates tables of a profile and writes them: NAME_punctual, NAME_ambient and, where it is asked for, NAME_penumbra.
+/// `described` names the profile in the report, which [`Tables::write_report`] writes when all is done.
+///
+/// # Errors
+/// [`Error::Profile`] where the profile is none; whatever the destination has against the files.
+pub fn tables(
+    profile: &Profile,
+    described: &str,
+    how: &TableOptions,
+    out: &dyn Sink,
+    task: Task<'_>,
+) -> Result<Tables, Error> {
+    let profile = scaled(profile, f64::from(how.scale));
+    let radial = profile.radial().map_err(Error::Profile)?;
+    let (width, height) = (how.size.0 as usize, how.size.1 as usize);
+    let range = f64::from(how.range);
+    let points = width * height * (1 + INTERPOLATION_GRID * INTERPOLATION_GRID);
+    let integrating = task.begin(Stage::Tables, "", points as u64)?;
+    let tick = |points| integrating.tick(points);
+    let punctual = punctual_table(radial, width, height, range, &tick)?;
+    let ambient = ambient_table(radial, width, range);
+    let error = punctual_interpolation_error(radial, &punctual, range, &tick)?;
+
+    let mut report = TablesReport {
+        kinran: env!("CARGO_PKG_VERSION"),
+        profile: described.into(),
+        scale: how.scale,
+        range: how.range,
+        tables: Vec::new(),
+        written: Vec::new(),
+        kept: Vec::new(),
+    };
+    let mut add = |content, table: &Table, [across, down]: [&'static str; 2], error| -> Result<(), Error> {
+        let TablesReport { tables, written, .. } = &mut report;
+        tables.push(put_table(content, table, [across, down], error, how, written, out)?);
+        Ok(())
+    };
+    let axes = ["n·u from -1 to 1", "curvature from 0 to range"];
+    add(Content::SkinPunctual, &punctual, axes, Some(error))?;
+    add(Content::SkinAmbient, &ambient, ["mean curvature from 0 to range", "band 1, band 2"], None)?;
+    if how.penumbra {
+        let side = PENUMBRA as usize;
+        let table = penumbra_table(radial, width.min(side), height.min(side), 1.0);
+        let axes = ["filtered shadow from 0 to 1", "one over the penumbra's width from 0 to 1/mm"];
+        add(Content::SkinPenumbra, &table, axes, None)?;
+    }
+    Ok(Tables { punctual, ambient, report })
+}
+
+impl Tables {
+    /// Writes the report; `others` are files that were written besides the tables.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn write_report(
+        &mut self,
+        how: &TableOptions,
+        others: Vec<WrittenFile>,
+        out: &dyn Sink,
+    ) -> Result<(), Error> {
+        let report = &mut self.report;
+        report.written.extend(others);
+        report.kept = kept_files(out, &how.report(), &report.written);
+        let mut text = serde_json::to_string_pretty(report).map_err(|e| Error::Internal(e.to_string()))?;
+        text.push('\n');
+        out.put(&how.report(), text.as_bytes())
+    }
+}
+
+/// A profile with other lengths. Densities are normalised later: only lengths matter.
+fn scaled(profile: &Profile, k: f64) -> Profile {
+    match profile {
+        Profile::Gaussians(sum) => {
+            let scaled = |g: &Gaussian| Gaussian { variance: g.variance * k * k, ..*g };
+            Profile::Gaussians(sum.iter().map(scaled).collect())
+        }
+        Profile::Burley(d) => Profile::Burley(d.map(|d| d * k)),
+        Profile::MeanFreePath { path, albedo } => {
+            Profile::MeanFreePath { path: path.map(|d| d * k), albedo: *albedo }
+        }
+        Profile::Table(rows) => Profile::Table(rows.iter().map(|&(r, d)| (r * k, d)).collect()),
+    }
+}
+
+fn put_table(
+    content: Content,
+    table: &Table,
+    [across, down]: [&'static str; 2],
+    interpolation_error: Option<f32>,
+    how: &TableOptions,
+    written: &mut Vec<WrittenFile>,
+    out: &dyn Sink,
+) -> Result<TableReport, Error> {
+    let label = match how.format {
+        TableFormat::Rgba16F => "rgba16f",
+        TableFormat::Srgb8 => "srgb8",
+        TableFormat::Linear8 => "rgba8",
+    };
+    let mut texture = table.texture(how.format)?;
+    content.mark(&mut texture);
+    texture.metadata.insert("KinranRange".into(), how.range.to_string());
+    let mut files = Vec::new();
+    for extension in how.container.extensions() {
+        let file = how.file(content, extension);
+        let bytes = match *extension {
+            "dds" => encode_dds(&texture)?,
+            _ => encode_ktx2(&texture, None)?,
+        };
+        out.put(&file, &bytes)?;
+        written.push(WrittenFile::new(&*file, &bytes));
+        files.push(file);
+    }
+    Ok(TableReport {
+        files,
+        width: table.width,
+        height: table.height,
+        format: label,
+        across,
+        down,
+        encoding_error: table.texture_error(&texture)?,
+        interpolation_error,
+    })
+}
