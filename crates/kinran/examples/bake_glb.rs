@@ -1,5 +1,7 @@
 //! Bakes a `.glb` from bytes to bytes: `cargo run --example bake_glb -- lamp.glb baked/`. Enter stops it.
 
+#![allow(clippy::print_stderr)]
+
 use std::path::Path;
 
 use kinran::bake::{GltfOptions, gltf};

@@ -204,10 +204,10 @@ pub fn gltf(
         }
     }
     let _writing = task.begin(Stage::Writing, &model, 0)?;
-    let (packed, packing) = pack(&document, &model, out)?;
-    report.warnings.extend(packing);
+    let outgoing = pack(&document, &model, out)?;
+    report.warnings.extend(outgoing.warnings);
     written.extend(dumps);
-    for (name, bytes) in packed {
+    for (name, bytes) in outgoing.files {
         out.put(&name, &bytes)?;
         written.push(WrittenFile::new(name, &bytes));
     }
@@ -215,12 +215,16 @@ pub fn gltf(
     Ok(report)
 }
 
-/// The document and the files that it takes along, by name, the document last; and what could not be cleaned up.
-fn pack(
-    document: &Document,
-    model: &str,
-    out: &dyn Sink,
-) -> Result<(Vec<(String, Vec<u8>)>, Vec<String>), Error> {
+/// A document and the files that it takes along.
+struct Outgoing {
+    /// Names and contents, the document last.
+    files: Vec<(String, Vec<u8>)>,
+    /// What could not be cleaned up.
+    warnings: Vec<String>,
+}
+
+/// The document as it goes to its destination.
+fn pack(document: &Document, model: &str, out: &dyn Sink) -> Result<Outgoing, Error> {
     let (packed, folder) = match out.place(model) {
         Some(place) => (document.pack(&place)?, place.parent().map(Path::to_path_buf).unwrap_or_default()),
         None => (document.pack_in_memory(model)?, PathBuf::new()),
@@ -230,7 +234,7 @@ fn pack(
         path.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
     };
     let files = packed.files.into_iter().map(|(path, bytes)| (name(&path), bytes)).collect();
-    Ok((files, packed.warnings))
+    Ok(Outgoing { files, warnings: packed.warnings })
 }
 
 /// The textures that will be baked, before any is.
@@ -511,12 +515,12 @@ fn check(
 
     // The model and what it takes along; what is there already is no loss.
     let model = file_name(input);
-    let (packed, _) = pack(document, &model, out)?;
-    space.most += packed.iter().map(|(_, bytes)| bytes.len() as u64).sum::<u64>();
+    let outgoing = pack(document, &model, out)?.files;
+    space.most += outgoing.iter().map(|(_, bytes)| bytes.len() as u64).sum::<u64>();
     let is_new = |(name, bytes): &(String, Vec<u8>)| {
         *name == model || out.get(name).is_some_and(|there| there != *bytes)
     };
-    names.extend(packed.into_iter().filter(is_new).map(|(name, _)| name));
+    names.extend(outgoing.into_iter().filter(is_new).map(|(name, _)| name));
     let stem = input.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     names.push(format!("{stem}.kinran.json"));
     out.expect(&names, space)
