@@ -12,7 +12,7 @@
 //!
 //! For a given m, with `s = 1 - m` and `g = f - φ s`, b is the projection of (d, g) on (s, m): `b = (s d + m g) / (s² + m²)`.
 //! What is left is a function of m alone. It may have two minima (dark colours: φ is neither scattered nor b's), so it is looked
-//! at all over and then more and more closely ([`together`]).
+//! at all over and then more and more closely (`together`).
 
 use kinran_image::srgb::byte_from_linear;
 use kinran_image::{Cancelled, Image, Tick, Transfer, full_level_count};

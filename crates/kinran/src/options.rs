@@ -3,7 +3,7 @@
 use kinran_bake::aniso::{Filter, Kernel, Sheet, SurfaceOptions};
 use kinran_image::{Encoder, Encoding, Format, Preset, Role};
 
-use crate::{Error, Space};
+use crate::Error;
 
 /// Which maps hold the lobe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,11 +156,6 @@ impl TextureOptions {
     pub(crate) fn of_sheet(&self, sheet: Sheet) -> Encoding {
         let format = if sheet == Sheet::Normal { self.normal_format } else { self.aniso_format };
         self.encoding(role_of(sheet), format)
-    }
-
-    /// The space of a texture's files.
-    pub(crate) fn space(&self, format: Format, size: (u32, u32)) -> Space {
-        Space::of_texture(self.container, self.zstd, format, size)
     }
 
     /// The names of a texture's files.

@@ -5,7 +5,6 @@ use kinran_image::{Texture, Transfer};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::bake::MeshCurvature;
 use crate::content::Content;
 use crate::options::TextureOptions;
 use crate::{Error, Sink};
@@ -85,6 +84,26 @@ impl SurfaceReport {
     pub fn new(name: String) -> Self {
         SurfaceReport { name, inputs: Vec::new(), outputs: Vec::new(), levels: Vec::new() }
     }
+}
+
+/// Curvature of one mesh.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct MeshCurvature {
+    /// The mesh.
+    pub mesh: String,
+    /// Millimetres in its unit.
+    pub millimetres: f64,
+    /// Curvature of the code 255, 1/mm.
+    pub range: f32,
+    /// Largest error of packing, 1/mm.
+    pub largest_error: f32,
+    /// Root of the mean square of packing's error, 1/mm.
+    pub rms_error: f32,
+    /// Vertices whose curvature is above the range.
+    pub clamped_vertices: usize,
+    /// What the mesh is made of, and what was skipped.
+    #[serde(flatten)]
+    pub found: kinran_bake::curvature::Report,
 }
 
 /// What one run baked.

@@ -1,6 +1,7 @@
 //! Flags about skin and the curvature of meshes.
 
-use kinran::bake::{CurvatureOptions, Dump, MeshCurvature, Which};
+use kinran::bake::{CurvatureOptions, Dump, Which};
+use kinran::report::MeshCurvature;
 use kinran_bake::curvature::Method;
 
 use crate::values::{Choices, choice, number};

@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use kinran::bake::MeshCurvature;
-use kinran::report::{Report, SurfaceReport, WrittenFile};
+use kinran::report::{MeshCurvature, Report, SurfaceReport, WrittenFile};
 use kinran_bake::folder::Row;
 use schemars::JsonSchema;
 use serde::Serialize;

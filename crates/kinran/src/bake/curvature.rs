@@ -4,75 +4,21 @@ use std::path::Path;
 
 use glam::{Mat3, Vec3, Vec4};
 use kinran_bake::curvature::{
-    BLUR, Curvature, CurvatureError, Mesh, Method, Options, Packed, bake_curvature, estimated_normals,
-    principal, uniform_scale,
+    Curvature, CurvatureError, Mesh, Options, Packed, bake_curvature, estimated_normals, principal,
+    uniform_scale,
 };
 use kinran_image::{Files, encode_exr_planes, untold};
 use kinran_scene::{Attribute, Document, Instance, Maps, Needs, Pose, Primitive, Scene, Skin};
 use kinran_shading::Sym2;
-use schemars::JsonSchema;
-use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::{GltfOptions, file_stem};
-use crate::report::{Report, WrittenFile};
+use super::file_stem;
+use super::gltf_options::{Dump, GltfOptions, Which};
+use crate::report::{MeshCurvature, Report, WrittenFile};
 use crate::{Error, Sink, Stage, Task};
 
 /// The extension that makes a material skin.
 const SKIN: &str = "KINRAN_materials_skin";
-
-/// How curvature is measured.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct CurvatureOptions {
-    /// Which meshes get curvature tensors.
-    pub of: Which,
-    /// How tensors are found.
-    pub method: Method,
-    /// Curvature of the largest code, 1/mm, 0.0001 to 1000; by default what fits the mesh.
-    pub range: Option<f32>,
-    /// Deviations of the Gaussians that blur curvature, mm, at most four; by default [`BLUR`].
-    pub blur: Vec<f64>,
-    /// Millimetres in a unit of the file's meshes; by default glTF's metre times the nodes' scale.
-    pub millimetres: Option<f32>,
-    /// Also writes tensors to files for other tools.
-    pub dump: Option<Dump>,
-}
-
-impl Default for CurvatureOptions {
-    fn default() -> Self {
-        CurvatureOptions {
-            of: Which::Skin,
-            method: Method::Normals,
-            range: None,
-            blur: BLUR.to_vec(),
-            millimetres: None,
-            dump: None,
-        }
-    }
-}
-
-/// Which meshes get curvature.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Which {
-    /// Those with a material that is skin.
-    #[default]
-    Skin,
-    /// All.
-    All,
-    /// None.
-    None,
-}
-
-/// File format of a dump.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Dump {
-    /// NAME_curvature.json: tensor, mean, principal curvatures and direction of every vertex.
-    Json,
-    /// NAME_curvature.exr: a pixel for each vertex, row by row: the mean in Y; xx, xy, yy in X, Y, Z of
-    /// the layer tensor.
-    Exr,
-}
 
 impl GltfOptions {
     /// Whether any of a document's primitives can get curvature.
@@ -93,26 +39,6 @@ impl GltfOptions {
             Which::None => false,
         }
     }
-}
-
-/// Curvature of one mesh.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct MeshCurvature {
-    /// The mesh.
-    pub mesh: String,
-    /// Millimetres in its unit.
-    pub millimetres: f64,
-    /// Curvature of the code 255, 1/mm.
-    pub range: f32,
-    /// Largest error of packing, 1/mm.
-    pub largest_error: f32,
-    /// Root of the mean square of packing's error, 1/mm.
-    pub rms_error: f32,
-    /// Vertices whose curvature is above the range.
-    pub clamped_vertices: usize,
-    /// What the mesh is made of, and what was skipped.
-    #[serde(flatten)]
-    pub found: kinran_bake::curvature::Report,
 }
 
 /// Writes smooth normals into the document where its meshes have none; whether any had none.

@@ -16,53 +16,13 @@ use kinran_scene::{
 };
 use serde_json::Value;
 
+use super::gltf_options::GltfOptions;
 use super::together::{together, why_apart};
-use super::{CurvatureOptions, curvature, file_name, file_stem, mip_texels, put_texture};
+use super::{curvature, file_name, file_stem, mip_texels, put_texture};
 use crate::content::Content;
-use crate::options::{Form, TextureOptions};
+use crate::options::TextureOptions;
 use crate::report::{Input, Output, Report, SurfaceReport, WrittenFile};
 use crate::{Error, Sink, Space, Stage, Task};
-
-/// How a glTF file is baked.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct GltfOptions {
-    /// How textures are filtered, compressed and stored.
-    pub textures: TextureOptions,
-    /// Which maps hold the lobe; glTF's own are always written. [`Form::Khr`] by default.
-    pub form: Form,
-    /// Whether base colour, emission and occlusion are baked too.
-    pub all_textures: bool,
-    /// Which way green points in normal maps, where they are not as glTF wants them; they are turned over where it points
-    /// down.
-    pub green: Option<Green>,
-    /// Folders whose files the model may name besides those of its own.
-    pub allow_outside: Vec<PathBuf>,
-    /// Materials that become skin, by name, or "all".
-    pub skin: Vec<String>,
-    /// How curvature is measured.
-    pub curvature: CurvatureOptions,
-    /// Whether meshes that have no normals get smooth ones.
-    pub estimate_normals: bool,
-    /// What the report names as its source: the way from the output to the model, `/`-separated.
-    pub source: Option<String>,
-}
-
-impl Default for GltfOptions {
-    fn default() -> Self {
-        GltfOptions {
-            textures: TextureOptions::default(),
-            form: Form::Khr,
-            all_textures: false,
-            green: None,
-            allow_outside: Vec::new(),
-            skin: Vec::new(),
-            curvature: CurvatureOptions::default(),
-            estimate_normals: false,
-            source: None,
-        }
-    }
-}
 
 /// A model, and what of it can be baked.
 #[derive(Debug)]

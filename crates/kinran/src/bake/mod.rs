@@ -3,22 +3,29 @@
 mod curvature;
 mod folder;
 mod gltf;
+mod gltf_options;
 mod together;
 
 use std::path::Path;
 
-use kinran_image::{Texture, encode_dds, encode_ktx2, full_level_count, level_size};
+use kinran_image::{Format, Texture, encode_dds, encode_ktx2, full_level_count, level_size};
 
 use crate::content::Content;
 use crate::options::TextureOptions;
 use crate::report::Output;
-use crate::{Error, Sink};
+use crate::{Error, Sink, Space};
 
-pub use curvature::{
-    CurvatureOptions, Dump, Joined, MeshCurvature, Which, measured, meshes, pose_scale, triangles_of, unit,
-};
+pub use curvature::{Joined, measured, meshes, pose_scale, triangles_of, unit};
 pub use folder::{FolderOptions, folder, folder_plan, understand};
-pub use gltf::{GltfOptions, Understood, gltf, gltf_space, texel_remarks, understand_gltf};
+pub use gltf::{Understood, gltf, gltf_space, texel_remarks, understand_gltf};
+pub use gltf_options::{CurvatureOptions, Dump, GltfOptions, Which};
+
+impl TextureOptions {
+    /// The space of a texture's files.
+    fn space(&self, format: Format, size: (u32, u32)) -> Space {
+        Space::of_texture(self.container, self.zstd, format, size)
+    }
+}
 
 /// Texels of all levels.
 pub(crate) fn mip_texels((width, height): (u32, u32)) -> u64 {
