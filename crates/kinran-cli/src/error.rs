@@ -113,7 +113,7 @@ impl From<kinran::Error> for Error {
             ),
             Task::OverMap { file } => Error::file_error(
                 file,
-                "is a map of the model that is baked and would be overwritten; name another folder with --output",
+                "is a map of what is baked and would be overwritten; name another folder with --output",
             ),
             Task::SameName { input, what, name, fix } => {
                 Error::file_error(input, format!("two {what} would both be written to {name}; {fix}"))

@@ -180,6 +180,10 @@ impl Sink for Output<'_> {
     fn place(&self, name: &str) -> Option<PathBuf> {
         OutputFolder::new(self.folder).place(name)
     }
+
+    fn is_on_disk(&self) -> bool {
+        true
+    }
 }
 
 /// The end of a report's name, by which a later run finds it.

@@ -5,13 +5,15 @@ mod profile_file;
 
 use std::path::{Path, PathBuf};
 
+use kinran::Space;
 use kinran::options::Container;
 use kinran::skin::{TableOptions, tables};
-use kinran::{Sink, Space};
 use kinran_bake::skin_lut::{Profile, TableFormat};
 use kinran_shading::skin::profile::ProfileError;
 
-use crate::outputs::{Output, beside, check_folder, kept_remark, refuse_input, tell_place, written_file};
+use crate::outputs::{
+    Output, beside, check_folder, kept_remark, refuse_foreign, refuse_input, tell_place, written_file,
+};
 use crate::progress::Bars;
 use crate::values::{CONTAINERS, Choices, choice, number, size};
 use crate::{Console, Error};
@@ -142,12 +144,7 @@ pub(crate) fn space(args: &Args) -> Space {
 /// # Errors
 /// Whatever is wrong with the profile, the flags or the output folder.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    if args.name.is_empty() || args.name.contains(['/', '\\']) {
-        return Err(Error::flag_error(
-            format!("--name {}", args.name),
-            "must be the beginning of a file's name",
-        ));
-    }
+    args.options().check()?;
     let (profile, described) = profile(args)?;
     let refuse = |error: ProfileError| match &args.profile {
         Some(file) => Error::file_error(file, error.to_string()),
@@ -157,9 +154,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let (output, how) = (args.output(), args.options());
     check_folder(&output)?;
     let plot_file = format!("{}.png", args.name);
-    let (tables_files, space) = how.plan();
-    let all: Vec<String> = tables_files.into_iter().chain([plot_file.clone(), how.report()]).collect();
-    for file in &all {
+    let (tables_files, _) = how.plan();
+    for file in tables_files.iter().chain([&plot_file, &how.report()]) {
         refuse_input(&output.join(file), args.profile.as_deref())?;
     }
     let out = Output {
@@ -168,7 +164,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         force: args.force,
         console,
     };
-    out.expect(&all, space)?;
+    refuse_foreign(&output, std::slice::from_ref(&plot_file), args.force)?;
 
     let bars = Bars::new(console.progress());
     let mut made = tables(&profile, &described, &how, &out, bars.task())?;

@@ -35,7 +35,8 @@ pub trait Files: Debug + Send + Sync {
     /// Bytes of a file; `None` where there is none.
     fn size(&self, path: &Path) -> Option<u64>;
 
-    /// Where on the system's disk something lies: what is written there would replace it. `None` for what is not there.
+    /// What tells a file from all others, wherever they are: on a disk its canonical path, in memory one that no disk has.
+    /// What is written to this place replaces it. `None` for what is not there.
     fn place(&self, path: &Path) -> Option<PathBuf>;
 
     /// The same files, for who keeps them.
@@ -141,6 +142,11 @@ impl Memory {
         self.lock().iter().map(|(path, bytes)| (path.clone(), bytes.clone())).collect()
     }
 
+    /// The [`Files::place`] of a path, whether something is there or not.
+    pub fn place_of(&self, path: &Path) -> PathBuf {
+        Path::new(&format!("memory:{:p}", Arc::as_ptr(&self.0))).join(plain(path))
+    }
+
     fn lock(&self) -> MutexGuard<'_, BTreeMap<PathBuf, Arc<[u8]>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -207,8 +213,8 @@ impl Files for Memory {
         Some(self.get(path)?.len() as u64)
     }
 
-    fn place(&self, _: &Path) -> Option<PathBuf> {
-        None
+    fn place(&self, path: &Path) -> Option<PathBuf> {
+        self.canonical(path).ok().map(|path| self.place_of(&path))
     }
 
     fn share(&self) -> Arc<dyn Files> {

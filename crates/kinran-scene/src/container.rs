@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
-use kinran_image::{Files, IMAGE_EXTENSIONS, plain};
+use kinran_image::{Files, IMAGE_EXTENSIONS, io_reason, plain};
 use percent_encoding::percent_decode_str;
 
 use crate::Error;
@@ -53,6 +53,9 @@ pub(crate) fn split<'a>(name: &Path, bytes: &'a [u8]) -> Result<Container<'a>, E
         let container = Container::new(bytes, None, Vec::new());
         if container.json.iter().find(|byte| !byte.is_ascii_whitespace()) != Some(&b'{') {
             let reason = match name.extension().filter(|_| !is_gltf(name)) {
+                Some(extension) if extension.eq_ignore_ascii_case("obj") => {
+                    "is an OBJ, which has no materials and no document; save it as .glb".into()
+                }
                 Some(extension) => {
                     format!("`.{}` is not read; give .glb, .gltf or .obj", extension.to_string_lossy())
                 }
@@ -310,7 +313,7 @@ pub(crate) fn fetch(
         Target::File(path) => match resolve(&path) {
             Ok(bytes) => purpose.check(&path, &bytes).map(|()| bytes).map_err(malformed),
             Err(Refusal::Io(error)) => {
-                Err(malformed(format!("the file \"{path}\" it names cannot be read: {error}")))
+                Err(malformed(format!("the file \"{path}\" it names cannot be read: {}", io_reason(&error))))
             }
             Err(Refusal::Outside { folder }) => Err(Error::Outside {
                 path: name.to_path_buf(),

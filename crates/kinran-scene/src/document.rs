@@ -875,15 +875,15 @@ impl Document {
             .collect()
     }
 
-    /// Whether a file on the disk is one that the document names.
+    /// Whether the file at a [`Files::place`] is one that the document names.
     pub fn names_file(&self, there: &Path) -> bool {
         self.own_files().iter().any(|own| self.is_at(own, there))
     }
 
-    /// Whether what the document calls `own` is the file or folder `there` of the disk.
+    /// Whether what the document calls `own` is the file or folder at a place.
     fn is_at(&self, own: &Path, there: &Path) -> bool {
-        let place = self.source.place(own);
-        place.is_some_and(|place| there.canonicalize().is_ok_and(|there| there == place))
+        let there = there.canonicalize().unwrap_or_else(|_| there.to_path_buf());
+        self.source.place(own).is_some_and(|place| place == there)
     }
 
     fn folder(&self) -> PathBuf {

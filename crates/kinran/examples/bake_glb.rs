@@ -1,17 +1,19 @@
-//! Bakes a `.glb` from bytes to bytes: `cargo run --example bake_glb -- lamp.glb baked/`. Enter stops it.
+//! Bakes a `.glb` from bytes to bytes: `cargo run -p kinran --example bake_glb -- lamp.glb baked/`. Enter stops it.
 
 #![allow(clippy::print_stderr)]
 
 use std::path::Path;
 
 use kinran::bake::{GltfOptions, gltf};
-use kinran::{Cancel, Error, Memory, Progress, Task};
+use kinran::{Cancel, Error, Memory, OutputFolder, Progress, Sink, Task};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [model, folder] = [1, 2].map(|i| std::env::args().nth(i).unwrap_or_default());
     let (files, out) = (Memory::from([("model.glb", std::fs::read(model)?)]), Memory::new());
     static CANCEL: Cancel = Cancel::new();
-    std::thread::spawn(|| std::io::stdin().read_line(&mut String::new()).map(|_| CANCEL.cancel()));
+    std::thread::spawn(|| {
+        matches!(std::io::stdin().read_line(&mut String::new()), Ok(1..)).then(|| CANCEL.cancel())
+    });
     let tell = |p: Progress<'_>| eprintln!("{p}: {} of {}", p.done, p.total);
     let mut how = GltfOptions::default();
     how.all_textures = true;
@@ -21,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Err(error) => return Err(format!("{}: {error}", error.code()).into()),
     }
     for (name, bytes) in out.files() {
-        std::fs::write(Path::new(&folder).join(name), bytes)?;
+        OutputFolder::new(&folder).put(&name.to_string_lossy(), &bytes)?;
     }
     Ok(())
 }

@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use kinran_bake::aniso::Filter;
+use kinran_bake::cache::relative;
 use kinran_image::{
     Files, Format, Texture, Transfer, decode_texture, full_level_count, image_size_of, untold,
 };
@@ -45,10 +46,10 @@ pub fn check(files: &dyn Files, path: &Path) -> Result<Vec<Finding>, Error> {
         findings.texture_file(&name_of(path), path, &bytes, None);
     } else if is_gltf(path) {
         findings.model(files, path)?;
-    } else if is("json") {
+    } else if name_of(path).to_ascii_lowercase().ends_with(".kinran.json") {
         findings.report(files, path, &bytes);
     } else {
-        let reason = "is nothing that is checked; give a .ktx2, .dds, .gltf, .glb or a report .kinran.json";
+        let reason = "is nothing that is checked; give a .ktx2, .dds, .gltf, .glb or a report (.kinran.json)";
         return Err(kinran_image::Error::malformed(path, reason).into());
     }
     Ok(findings.0)
@@ -76,6 +77,11 @@ impl Findings {
     ) -> Option<Texture> {
         match decode_texture(path, bytes) {
             Ok(texture) => {
+                let is_dds = bytes.starts_with(b"DDS ");
+                if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("dds")) != is_dds {
+                    let [kind, end] = if is_dds { ["DDS", ".dds"] } else { ["KTX2", ".ktx2"] };
+                    self.add(place, format!("holds {kind}; its name must end in {end}"));
+                }
                 self.texture(place, &texture, slot);
                 Some(texture)
             }
@@ -317,6 +323,10 @@ impl Findings {
             Err(error) => return self.add(&name, format!("names no files that were written: {error}")),
         };
         for file in known.files() {
+            if relative(&file.file).is_none() {
+                self.add(&name, format!("\"{}\" leads out of its folder", file.file));
+                continue;
+            }
             match files.read(&path.with_file_name(&file.file)) {
                 Err(error) => self.add(&file.file, kinran_image::io_reason(&error)),
                 Ok(now) if WrittenFile::new(&*file.file, &now) != file => {
@@ -332,6 +342,10 @@ impl Findings {
                 self.add(&name, "an output of a surface has no file");
                 continue;
             };
+            if relative(file).is_none() {
+                self.add(&name, format!("\"{file}\" leads out of its folder"));
+                continue;
+            }
             let path = path.with_file_name(file);
             let Ok(bytes) = files.read(&path) else { continue };
             let Some(texture) = self.texture_file(file, &path, &bytes, None) else { continue };

@@ -36,8 +36,8 @@ pub enum Error {
         /// The model.
         input: PathBuf,
     },
-    /// A texture would overwrite a map of the model.
-    #[error("{}: is a map of the model that is baked and would be overwritten; give another destination", file.display())]
+    /// A texture would overwrite a map that it is made from.
+    #[error("{}: is a map of what is baked and would be overwritten; give another destination", file.display())]
     OverMap {
         /// The map.
         file: PathBuf,

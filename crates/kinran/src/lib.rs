@@ -40,6 +40,6 @@ mod task;
 
 pub use check::{Finding, check};
 pub use error::Error;
-pub use kinran_image::{Disk, Files, Memory};
+pub use kinran_image::{Disk, Entry, Files, Memory};
 pub use sink::{OutputFolder, Sink, Space};
 pub use task::{Cancel, Progress, Stage, Task};

@@ -1,7 +1,10 @@
 //! How textures are made: the options that all bakes share.
 
-use kinran_bake::aniso::{Filter, Kernel, Sheet, SurfaceOptions};
-use kinran_image::{Encoder, Encoding, Format, Preset, Role};
+use kinran_bake::aniso::{Sheet, SurfaceOptions};
+use kinran_image::{Encoding, Role};
+
+pub use kinran_bake::aniso::{Filter, Kernel};
+pub use kinran_image::{Encoder, Format, Preset};
 
 use crate::Error;
 

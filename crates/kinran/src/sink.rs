@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use kinran_bake::cache::relative;
 use kinran_image::{Format, Memory, full_level_count, level_size, write_atomically};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -27,15 +28,21 @@ pub trait Sink: Sync {
     /// Where it cannot be written.
     fn put(&self, name: &str, bytes: &[u8]) -> Result<(), Error>;
 
-    /// The file of a name, where there is one.
+    /// The file of a name, where there is one: what an earlier run wrote. Asked at any time, also before
+    /// [`Sink::expect`].
     fn get(&self, name: &str) -> Option<Vec<u8>>;
 
-    /// Where on the system's disk a name is; `None` where it is not on a disk.
+    /// Where a name is, in the words of [`Files::place`](crate::Files::place); `None` where nothing that is read can be
+    /// there.
     fn place(&self, name: &str) -> Option<PathBuf>;
+
+    /// Whether it is a folder of the system's disk: what lies beside a model there need not be written again.
+    fn is_on_disk(&self) -> bool;
 }
 
 /// A folder on a disk. It is made when the first file comes; each file appears by rename.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct OutputFolder {
     /// Its path.
     pub path: PathBuf,
@@ -48,8 +55,19 @@ impl OutputFolder {
     }
 }
 
+/// The place of a name, if something is there.
+pub(crate) fn place_in(out: &dyn Sink, name: &str) -> Option<PathBuf> {
+    let place = out.place(name)?;
+    Some(place.canonicalize().unwrap_or(place))
+}
+
 impl Sink for OutputFolder {
     fn put(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+        if relative(name).is_none() {
+            let reason =
+                format!("{name}: leads out of the folder {}; write it elsewhere", self.path.display());
+            return Err(kinran_image::Error::Unsupported(reason).into());
+        }
         let path = self.path.join(name);
         let folder = path.parent().unwrap_or(&self.path);
         std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
@@ -64,6 +82,10 @@ impl Sink for OutputFolder {
     fn place(&self, name: &str) -> Option<PathBuf> {
         Some(self.path.join(name))
     }
+
+    fn is_on_disk(&self) -> bool {
+        true
+    }
 }
 
 impl Sink for Memory {
@@ -76,8 +98,12 @@ impl Sink for Memory {
         Memory::get(self, name).map(|bytes| bytes.to_vec())
     }
 
-    fn place(&self, _: &str) -> Option<PathBuf> {
-        None
+    fn place(&self, name: &str) -> Option<PathBuf> {
+        Some(self.place_of(Path::new(name)))
+    }
+
+    fn is_on_disk(&self) -> bool {
+        false
     }
 }
 

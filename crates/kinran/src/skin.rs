@@ -1,11 +1,21 @@
 //! The tables that skin is lit with.
+//!
+//! ```
+//! use kinran::skin::{Profile, TableOptions, tables};
+//! use kinran::{Memory, Task};
+//!
+//! let (mut how, out) = (TableOptions::default(), Memory::new());
+//! how.size = (32, 16);
+//! let mut made = tables(&Profile::default(), "human skin", &how, &out, Task::QUIET)?;
+//! made.write_report(&how, Vec::new(), &out)?;
+//! assert!(out.get("skin_punctual.ktx2").is_some() && out.get("skin.kinran.json").is_some());
+//! # Ok::<(), kinran::Error>(())
+//! ```
 
 use kinran_bake::skin_lut::{
-    INTERPOLATION_GRID, Profile, Table, TableFormat, ambient_table, penumbra_table,
-    punctual_interpolation_error, punctual_table,
+    INTERPOLATION_GRID, ambient_table, penumbra_table, punctual_interpolation_error, punctual_table,
 };
 use kinran_image::{encode_dds, encode_ktx2};
-use kinran_shading::skin::profile::Gaussian;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -13,6 +23,9 @@ use crate::content::Content;
 use crate::options::Container;
 use crate::report::{WrittenFile, kept_files};
 use crate::{Error, Sink, Space, Stage, Task};
+
+pub use kinran_bake::skin_lut::{Profile, Table, TableFormat};
+pub use kinran_shading::skin::profile::Gaussian;
 
 /// Which tables are made.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,9 +35,9 @@ pub struct TableOptions {
     pub name: String,
     /// Texels of the punctual table, 2 to 4096 along a side; 512 by default.
     pub size: (u32, u32),
-    /// Largest curvature, 1/mm, that of the meshes' codes; 0.5 by default.
+    /// Largest curvature, 1/mm, 0.001 to 100, that of the meshes' codes; 0.5 by default.
     pub range: f32,
-    /// Multiplies all lengths of the profile; 1 by default.
+    /// Multiplies all lengths of the profile, 0.001 to 1000; 1 by default.
     pub scale: f32,
     /// Texels and their encoding; half floats by default.
     pub format: TableFormat,
@@ -60,6 +73,33 @@ impl TableOptions {
     /// The name of the report.
     pub fn report(&self) -> String {
         format!("{}.kinran.json", self.name)
+    }
+
+    /// Refuses what no table can have.
+    ///
+    /// # Errors
+    /// [`Error::Option`] that names the option and what it may be.
+    pub fn check(&self) -> Result<(), Error> {
+        let refused = |option, given: String, reason: &str| {
+            Err(Error::Option { option, given, file: None, reason: reason.into() })
+        };
+        if self.name.is_empty() || self.name.contains(['/', '\\']) {
+            return refused("name", self.name.clone(), "must be the beginning of a file's name");
+        }
+        let (width, height) = self.size;
+        if !(2..=4096).contains(&width) || !(2..=4096).contains(&height) {
+            let reason = "a table has 2 to 4096 texels along a side";
+            return refused("size", format!("{width}x{height}"), reason);
+        }
+        for (option, value, range) in
+            [("range", self.range, 0.001..=100.0), ("scale", self.scale, 0.001..=1000.0)]
+        {
+            if !range.contains(&value) {
+                let reason = format!("give {} to {}", range.start(), range.end());
+                return refused(option, value.to_string(), &reason);
+            }
+        }
+        Ok(())
     }
 
     /// The files that [`tables`] will write, without the report, and the bytes that they will take.
@@ -135,7 +175,8 @@ pub struct Tables {
 /// `described` names the profile in the report, which [`Tables::write_report`] writes when all is done.
 ///
 /// # Errors
-/// [`Error::Profile`] where the profile is none; whatever the destination has against the files.
+/// [`Error::Option`] where an option is out of its range, [`Error::Profile`] where the profile is none; whatever the
+/// destination has against the files.
 pub fn tables(
     profile: &Profile,
     described: &str,
@@ -143,8 +184,12 @@ pub fn tables(
     out: &dyn Sink,
     task: Task<'_>,
 ) -> Result<Tables, Error> {
+    how.check()?;
     let profile = scaled(profile, f64::from(how.scale));
     let radial = profile.radial().map_err(Error::Profile)?;
+    let (mut names, space) = how.plan();
+    names.push(how.report());
+    out.expect(&names, space)?;
     let (width, height) = (how.size.0 as usize, how.size.1 as usize);
     let range = f64::from(how.range);
     let points = width * height * (1 + INTERPOLATION_GRID * INTERPOLATION_GRID);

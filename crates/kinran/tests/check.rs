@@ -147,4 +147,14 @@ fn a_report_speaks_of_files_that_are_others_now() {
         String::from_utf8(bytes).unwrap().replacen("\"levels\": 6", "\"levels\": 7", 1).into_bytes()
     });
     assert!(only(check(&lies, name.as_ref()).unwrap()).contains("levels: it has 6"));
+    let written = r#"{ "written": [{ "file": "../secret", "bytes": 1, "blake3": "" }] }"#;
+    let outside = Memory::from([("a/x.kinran.json", written.as_bytes()), ("secret", b"s")]);
+    let said = only(check(&outside, "a/x.kinran.json".as_ref()).unwrap());
+    assert_eq!(said, "x.kinran.json: \"../secret\" leads out of its folder");
+    let files = changed(&files, texture, |bytes| bytes);
+    files.insert("silk_normal.dds", files.get(texture).unwrap());
+    let said = only(check(&files, "silk_normal.dds".as_ref()).unwrap());
+    assert_eq!(said, "silk_normal.dds: holds KTX2; its name must end in .ktx2");
+    let dump = Memory::from([("boot_curvature.json", b"{}".to_vec())]);
+    assert!(check(&dump, "boot_curvature.json".as_ref()).is_err());
 }

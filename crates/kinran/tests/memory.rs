@@ -8,12 +8,11 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use common::{maps, model, png};
-use kinran::bake::{FolderOptions, GltfOptions, Which, folder, gltf, understand};
+use kinran::bake::{CurvatureOptions, FolderOptions, GltfOptions, Which, folder, gltf, understand};
 use kinran::options::{Container, Form};
-use kinran::skin::{TableOptions, tables};
+use kinran::skin::{Profile, TableOptions, tables};
 use kinran::{Cancel, Disk, Error, Files, Memory, OutputFolder, Progress, Sink, Task, check};
-use kinran_bake::skin_lut::Profile;
-use kinran_image::{Channels, Encoder};
+use kinran_image::{Channels, Encoder, Texture, decode_ktx2, encode_ktx2};
 
 /// The files in a folder of a disk, by their paths in it.
 fn read_all(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -114,6 +113,70 @@ fn tables_of_skin_break_the_rules_for_tables() {
 }
 
 #[test]
+fn a_bake_overwrites_what_it_is_made_from() {
+    let files: Memory =
+        model().into_iter().map(|(name, bytes)| (name.replace("models/", ""), bytes)).collect();
+    let before = files.files();
+    let error =
+        gltf(&files, Path::new("drum.gltf"), &GltfOptions::default(), &files, Task::QUIET).unwrap_err();
+    assert!(matches!(error, Error::OverInput { .. }), "{error}");
+    assert!(files.files() == before, "files have changed");
+
+    let baked = Memory::new();
+    bake_maps(&maps().into_iter().collect::<Memory>(), Path::new(""), &baked, Task::QUIET).unwrap();
+    let normal = decode_ktx2("n".as_ref(), &baked.get("silk_normal.ktx2").unwrap()).unwrap();
+    let foreign = Texture { metadata: Default::default(), ..normal };
+    let files = Memory::from([("silk_normal.ktx2", encode_ktx2(&foreign, None).unwrap())]);
+    let folder_on_disk = tempfile::tempdir().unwrap();
+    std::fs::write(folder_on_disk.path().join("silk_normal.ktx2"), files.get("silk_normal.ktx2").unwrap())
+        .unwrap();
+    let disk = OutputFolder::new(folder_on_disk.path());
+    let cases: [(&dyn Files, &Path, &dyn Sink); 2] =
+        [(&files, Path::new(""), &files), (&Disk, folder_on_disk.path(), &disk)];
+    for (files, root, out) in cases {
+        let mut how = FolderOptions::default();
+        how.hints.roughness = Some(0.5);
+        let understood = understand(files, root, &how).unwrap();
+        let error = folder(files, root, &understood, &how, out, Task::QUIET).unwrap_err();
+        assert!(matches!(error, Error::OverMap { .. }), "{}: {error}", root.display());
+    }
+    let error = disk.put("../outside", b"").unwrap_err().to_string();
+    assert!(error.contains("leads out"), "{error}");
+}
+
+#[test]
+fn numbers_out_of_their_ranges_are_taken() {
+    let tables_of = |change: &dyn Fn(&mut TableOptions)| {
+        let mut how = TableOptions::default();
+        change(&mut how);
+        tables(&Profile::default(), "", &how, &Memory::new(), Task::QUIET).map(drop)
+    };
+    let curvature_of = |change: &dyn Fn(&mut CurvatureOptions)| {
+        let mut how = GltfOptions::default();
+        change(&mut how.curvature);
+        let files: Memory = model().into_iter().collect();
+        gltf(&files, Path::new("models/drum.gltf"), &how, &Memory::new(), Task::QUIET).map(drop)
+    };
+    let cases = [
+        ("size", tables_of(&|how| how.size = (0, 0))),
+        ("size", tables_of(&|how| how.size = (1, 1))),
+        ("range", tables_of(&|how| how.range = f32::NAN)),
+        ("range", tables_of(&|how| how.range = 0.0)),
+        ("scale", tables_of(&|how| how.scale = -1.0)),
+        ("name", tables_of(&|how| how.name = "../x".into())),
+        ("name", tables_of(&|how| how.name.clear())),
+        ("curvature-range", curvature_of(&|how| how.range = Some(f32::NAN))),
+        ("curvature-range", curvature_of(&|how| how.range = Some(-1.0))),
+        ("unit-mm", curvature_of(&|how| how.millimetres = Some(0.0))),
+        ("curvature-blur", curvature_of(&|how| how.blur = vec![1.0; 5])),
+        ("curvature-blur", curvature_of(&|how| how.blur = vec![f64::NAN])),
+    ];
+    for (wanted, got) in cases {
+        assert!(matches!(got, Err(Error::Option { option, .. }) if option == wanted), "{wanted}: {got:?}");
+    }
+}
+
+#[test]
 fn work_ends_before_its_end_or_never() {
     let running: Mutex<BTreeMap<String, (u64, u64)>> = Mutex::default();
     let ended = AtomicU64::new(0);
@@ -125,7 +188,13 @@ fn work_ends_before_its_end_or_never() {
                 assert!(total == 0 || done == total, "{p} ended at {done} of {total}");
                 ended.fetch_add(1, Ordering::Relaxed);
             }
-            false => drop(running.insert(p.to_string(), (p.done, p.total))),
+            false => {
+                let before = running.insert(p.to_string(), (p.done, p.total));
+                let share = |(done, total): (u64, u64)| done as f64 / total.max(1) as f64;
+                let back =
+                    before.filter(|&b| b.1 > 0 && b.1 < p.total && share(b) > share((p.done, p.total)));
+                assert!(back.is_none(), "{p} went back from {back:?} to {} of {}", p.done, p.total);
+            }
         }
     };
     let cancel = Cancel::new();

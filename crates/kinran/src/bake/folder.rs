@@ -15,6 +15,7 @@ use super::{file_name, file_stem, mip_texels, put_texture};
 use crate::content::Content;
 use crate::options::{Form, TextureOptions};
 use crate::report::{Input, Output, Report, SurfaceReport};
+use crate::sink::place_in;
 use crate::{Error, Sink, Space, Stage, Task};
 
 /// How a folder of maps is baked.
@@ -50,7 +51,7 @@ pub fn understand(files: &dyn Files, folder: &Path, how: &FolderOptions) -> Resu
     Ok(scan_in(files, folder, &how.hints)?)
 }
 
-/// Bakes every material of a folder that [`understand`] has understood: NAME_normal and NAME_aniso, NAME_color and
+/// Bakes every material of the folder `input` that [`understand`] has understood, by the same options: NAME_normal and NAME_aniso, NAME_color and
 /// NAME_orm where there are such maps, and NAME.kinran.json. Gives a report for each material.
 ///
 /// # Errors
@@ -65,8 +66,14 @@ pub fn folder(
 ) -> Result<Vec<Report>, Error> {
     how.textures.check()?;
     let (names, space) = folder_plan(files, input, understood, how)?;
-    out.expect(&names, space)?;
     let materials = &understood.materials;
+    let maps: Vec<_> =
+        materials.iter().flat_map(|maps| &maps.files).map(|(_, map)| files.place(map)).collect();
+    let is_map = |name: &&String| place_in(out, name).is_some_and(|place| maps.contains(&Some(place)));
+    if let Some(name) = names.iter().find(is_map) {
+        return Err(Error::OverMap { file: out.place(name).unwrap_or_default() });
+    }
+    out.expect(&names, space)?;
     // A map that is none would be found out after hours of baking the materials before it.
     if let [_, _, ..] = materials.as_slice() {
         let reading = task.begin(Stage::Reading, "", materials.len() as u64)?;

@@ -22,6 +22,7 @@ use super::{curvature, file_name, file_stem, mip_texels, put_texture};
 use crate::content::Content;
 use crate::options::TextureOptions;
 use crate::report::{Input, Output, Report, SurfaceReport, WrittenFile};
+use crate::sink::place_in;
 use crate::{Error, Sink, Space, Stage, Task};
 
 /// A model, and what of it can be baked.
@@ -125,9 +126,10 @@ pub fn gltf(
     task: Task<'_>,
 ) -> Result<Report, Error> {
     how.textures.check()?;
+    how.curvature.check()?;
     let model = file_name(input);
-    let there = out.place(&model).and_then(|place| place.canonicalize().ok());
-    if there.is_some() && files.place(input) == there {
+    let own = files.place(input);
+    if own.is_some() && own == place_in(out, &model) {
         return Err(Error::OverInput { input: input.into() });
     }
     let Understood { scene, mut document, surfaces, mut warnings } =
@@ -185,7 +187,7 @@ struct Outgoing {
 
 /// The document as it goes to its destination.
 fn pack(document: &Document, model: &str, out: &dyn Sink) -> Result<Outgoing, Error> {
-    let (packed, folder) = match out.place(model) {
+    let (packed, folder) = match out.place(model).filter(|_| out.is_on_disk()) {
         Some(place) => (document.pack(&place)?, place.parent().map(Path::to_path_buf).unwrap_or_default()),
         None => (document.pack_in_memory(model)?, PathBuf::new()),
     };

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use kinran_bake::curvature::{BLUR, Method};
 use kinran_bake::folder::Green;
 
+use crate::Error;
 use crate::options::{Form, TextureOptions};
 
 /// How a glTF file is baked.
@@ -58,9 +59,9 @@ pub struct CurvatureOptions {
     pub method: Method,
     /// Curvature of the largest code, 1/mm, 0.0001 to 1000; by default what fits the mesh.
     pub range: Option<f32>,
-    /// Deviations of the Gaussians that blur curvature, mm, at most four; by default [`BLUR`].
+    /// Deviations of the Gaussians that blur curvature, mm, above 0, at most four; by default [`BLUR`].
     pub blur: Vec<f64>,
-    /// Millimetres in a unit of the file's meshes; by default glTF's metre times the nodes' scale.
+    /// Millimetres in a unit of the file's meshes, 1e-6 to 1e9; by default glTF's metre times the nodes' scale.
     pub millimetres: Option<f32>,
     /// Also writes tensors to files for other tools.
     pub dump: Option<Dump>,
@@ -99,4 +100,27 @@ pub enum Dump {
     /// NAME_curvature.exr: a pixel for each vertex, row by row: the mean in Y; xx, xy, yy in X, Y, Z of
     /// the layer tensor.
     Exr,
+}
+
+impl CurvatureOptions {
+    /// Refuses numbers out of their ranges.
+    ///
+    /// # Errors
+    /// [`Error::Option`] that names the option and what it may be.
+    pub fn check(&self) -> Result<(), Error> {
+        let refused = |option, given: String, reason: &str| {
+            Err(Error::Option { option, given, file: None, reason: reason.into() })
+        };
+        if let Some(range) = self.range.filter(|range| !(0.0001..=1000.0).contains(range)) {
+            return refused("curvature-range", range.to_string(), "give 0.0001 to 1000, in 1/mm");
+        }
+        if let Some(unit) = self.millimetres.filter(|unit| !(1e-6..=1e9).contains(unit)) {
+            return refused("unit-mm", unit.to_string(), "give 0.000001 to 1000000000, in mm");
+        }
+        if self.blur.len() > 4 || !self.blur.iter().all(|blur| *blur > 0.0 && *blur <= 1e6) {
+            let given = self.blur.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+            return refused("curvature-blur", given, "give at most four numbers above zero, in mm");
+        }
+        Ok(())
+    }
 }

@@ -15,6 +15,9 @@ use crate::options::TextureOptions;
 use crate::report::Output;
 use crate::{Error, Sink, Space};
 
+pub use kinran_bake::curvature::{BLUR, Method};
+pub use kinran_bake::folder::{Folder, FolderError, Green, Hints, Role, Row};
+
 pub use curvature::{Joined, measured, meshes, pose_scale, triangles_of, unit};
 pub use folder::{FolderOptions, folder, folder_plan, understand};
 pub use gltf::{Understood, gltf, gltf_space, texel_remarks, understand_gltf};

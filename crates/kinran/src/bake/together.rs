@@ -38,13 +38,13 @@ pub(super) fn together(
     if apart(reflectance, surface).is_none() {
         let own = reflectance.size();
         let size = (own.0.max(surface.0), own.1.max(surface.1));
-        let choosing = task.begin(Stage::Averaging(Content::Color), name, mip_texels(size))?;
+        let texels = mip_texels(size) + mip_texels(own);
+        let choosing = task.begin(Stage::Averaging(Content::Color), name, texels)?;
         let pair = match base_and_metal(reflectance, surface, how.kernel, &|texels| choosing.tick(texels)) {
             Ok(pair) => pair,
             Err(Apart::Cancelled(stopped)) => return Err(stopped.into()),
             Err(_) => return Ok(together),
         };
-        choosing.expect(pair.color.iter().map(|level| level.rgba8.len() as u64 / 4).sum());
         let encoding = how.encoding(Role::Color, how.color_format);
         let tick = |texels| choosing.tick(texels);
         together.color = Some(compress_levels(&pair.color, Transfer::Srgb, encoding, &tick)?);
