@@ -164,7 +164,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         force: args.force,
         console,
     };
-    refuse_foreign(&output, std::slice::from_ref(&plot_file), args.force)?;
+    // The plot lies beside the tables, and the report tells whose it is.
+    refuse_foreign(&output, &[how.report(), plot_file.clone()], args.force)?;
 
     let bars = Bars::new(console.progress());
     let mut made = tables(&profile, &described, &how, &out, bars.task())?;

@@ -268,7 +268,7 @@ mod tests {
         for asked in ["", "a", "a/b", "./a/../a", "x", "e.png", "a/b/c.png", "../y"] {
             let of = |files: &dyn Files, root: &Path| {
                 let path = root.join(asked);
-                let relative = |path: &Path| path.strip_prefix(root).unwrap_or(path).to_path_buf();
+                let relative = |path: &Path| plain(path.strip_prefix(root).unwrap_or(path));
                 let list = files.list(&path).map_err(|e| e.kind()).map(|entries| {
                     entries.into_iter().map(|e| (relative(&e.path), e.is_folder)).collect::<Vec<_>>()
                 });

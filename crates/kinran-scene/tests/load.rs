@@ -455,7 +455,11 @@ fn harmless_flaws_are_mended_with_a_warning() {
 fn paths_that_are_no_documents_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let error = Scene::load(folder.path()).unwrap_err().to_string();
-    assert!(error.contains("is a folder") && error.contains(folder.path().to_str().unwrap()), "{error}");
+    assert!(
+        error.contains("is a directory; name a file in it")
+            && error.contains(folder.path().to_str().unwrap()),
+        "{error}"
+    );
     let gone = folder.path().join("gone.glb");
     assert!(Scene::load(&gone).unwrap_err().to_string().contains("gone.glb"));
     for (name, content, word) in [
