@@ -85,6 +85,10 @@ impl Findings {
                 self.texture(place, &texture, slot);
                 Some(texture)
             }
+            Err(kinran_image::Error::Malformed { reason, .. }) => {
+                self.add(place, reason);
+                None
+            }
             Err(error) => {
                 self.add(place, error.to_string());
                 None

@@ -75,7 +75,7 @@ impl Sink for OutputFolder {
     }
 
     fn get(&self, name: &str) -> Option<Vec<u8>> {
-        let path = self.path.join(name);
+        let path = self.path.join(relative(name)?);
         path.is_file().then(|| std::fs::read(path).ok())?
     }
 

@@ -139,7 +139,12 @@ fn a_bake_overwrites_what_it_is_made_from() {
         let understood = understand(files, root, &how).unwrap();
         let error = folder(files, root, &understood, &how, out, Task::QUIET).unwrap_err();
         assert!(matches!(error, Error::OverMap { .. }), "{}: {error}", root.display());
+        assert!(!error.to_string().contains("memory:"), "{error}");
     }
+    std::fs::write(folder_on_disk.path().with_extension("txt"), "not ours").unwrap();
+    let beside = folder_on_disk.path().with_extension("txt");
+    assert_eq!(disk.get(&format!("../{}", beside.file_name().unwrap().display())), None);
+    std::fs::remove_file(beside).unwrap();
     let error = disk.put("../outside", b"").unwrap_err().to_string();
     assert!(error.contains("leads out"), "{error}");
 }

@@ -71,7 +71,8 @@ pub fn folder(
         materials.iter().flat_map(|maps| &maps.files).map(|(_, map)| files.place(map)).collect();
     let is_map = |name: &&String| place_in(out, name).is_some_and(|place| maps.contains(&Some(place)));
     if let Some(name) = names.iter().find(is_map) {
-        return Err(Error::OverMap { file: out.place(name).unwrap_or_default() });
+        let file = out.place(name).filter(|_| out.is_on_disk()).unwrap_or_else(|| name.into());
+        return Err(Error::OverMap { file });
     }
     out.expect(&names, space)?;
     // A map that is none would be found out after hours of baking the materials before it.

@@ -470,8 +470,9 @@ fn check(
         }
     }
     names.extend(plan.turned.iter().map(|turned| turned.file.clone()));
-    if let Some(file) = names.iter().filter_map(|name| out.place(name)).find(|file| document.names_file(file))
-    {
+    let is_map = |name: &&String| out.place(name).is_some_and(|file| document.names_file(&file));
+    if let Some(name) = names.iter().find(is_map) {
+        let file = out.place(name).filter(|_| out.is_on_disk()).unwrap_or_else(|| name.into());
         return Err(Error::OverMap { file });
     }
 
