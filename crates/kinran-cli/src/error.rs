@@ -74,7 +74,7 @@ pub enum Error {
     #[error("{}", .0.message)]
     Retold(Box<Failure>),
     /// Standard output could not be written.
-    #[error("standard output: {0}; send it elsewhere")]
+    #[error("standard output: {}; send it elsewhere", kinran_image::io_reason(.0))]
     Stdout(#[from] std::io::Error),
     /// The work was stopped.
     #[error(transparent)]
@@ -221,7 +221,8 @@ impl Error {
             Error::Scene(kinran_scene::Error::Cancelled(_)) | Error::Render(RenderError::Cancelled(_)) => {
                 "cancelled"
             }
-            Error::Scene(kinran_scene::Error::Io { .. }) | Error::Stdout(_) => "io",
+            Error::Scene(kinran_scene::Error::Io { .. } | kinran_scene::Error::Unreadable { .. })
+            | Error::Stdout(_) => "io",
             Error::Scene(kinran_scene::Error::Malformed { .. }) => "malformed",
             Error::Scene(kinran_scene::Error::Unsupported { .. }) => "unsupported",
             Error::Folder(_) => "maps",
@@ -255,6 +256,7 @@ impl Error {
                 kinran_scene::Error::Io { path, .. }
                 | kinran_scene::Error::Malformed { path, .. }
                 | kinran_scene::Error::Unsupported { path, .. }
+                | kinran_scene::Error::Unreadable { path, .. }
                 | kinran_scene::Error::Outside { path, .. },
             ) => Some(path),
             Error::Folder(

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
-use kinran_image::{Files, IMAGE_EXTENSIONS, io_reason, plain};
+use kinran_image::{Files, IMAGE_EXTENSIONS, plain};
 use percent_encoding::percent_decode_str;
 
 use crate::Error;
@@ -312,9 +312,12 @@ pub(crate) fn fetch(
         Target::Data(bytes) => Ok(bytes),
         Target::File(path) => match resolve(&path) {
             Ok(bytes) => purpose.check(&path, &bytes).map(|()| bytes).map_err(malformed),
-            Err(Refusal::Io(error)) => {
-                Err(malformed(format!("the file \"{path}\" it names cannot be read: {}", io_reason(&error))))
-            }
+            Err(Refusal::Io(source)) => Err(Error::Unreadable {
+                path: name.to_path_buf(),
+                what: what.into(),
+                file: path.into_owned(),
+                source,
+            }),
             Err(Refusal::Outside { folder }) => Err(Error::Outside {
                 path: name.to_path_buf(),
                 what: what.into(),

@@ -784,8 +784,8 @@ impl Document {
                     drop(entry_mut(&mut output.json, "images", image).insert("uri".into(), copied.into()))
                 }
                 // What is not there was not needed, or there would be an error by now.
-                Err(Error::Malformed { reason, .. }) => {
-                    output.warnings.push(format!("{reason}; the document still refers to it"));
+                Err(error @ (Error::Malformed { .. } | Error::Unreadable { .. })) => {
+                    output.warnings.push(format!("{}; the document still refers to it", error.reason()));
                 }
                 Err(error) => return Err(error),
             }

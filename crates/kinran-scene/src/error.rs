@@ -27,6 +27,18 @@ pub enum Error {
         /// What it needs, and what to do about it.
         reason: String,
     },
+    /// A file that a document names is not there, or the operating system refused to read it.
+    #[error("{}: {what}: the file \"{file}\" it names cannot be read: {}", path.display(), kinran_image::io_reason(source))]
+    Unreadable {
+        /// The document.
+        path: PathBuf,
+        /// The place in it.
+        what: String,
+        /// The path that stands there.
+        file: String,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
     /// A document names a file outside of its own folder, and nobody has allowed that.
     #[error(
         "{}: {what}: the file \"{file}\" lies outside of the model's folder; put it there, or, if you trust the \
@@ -58,6 +70,18 @@ impl Error {
 
     pub(crate) fn malformed(path: impl AsRef<Path>, reason: impl Into<String>) -> Self {
         Error::Malformed { path: path.as_ref().to_path_buf(), reason: reason.into() }
+    }
+
+    /// What is wrong, without the document, where it is what that holds or names.
+    pub(crate) fn reason(&self) -> String {
+        let said = self.to_string();
+        let (Error::Malformed { path, .. }
+        | Error::Unsupported { path, .. }
+        | Error::Unreadable { path, .. }) = self
+        else {
+            return said;
+        };
+        said.strip_prefix(&format!("{}: ", path.display())).map_or(said.clone(), str::to_owned)
     }
 
     pub(crate) fn unsupported(path: impl AsRef<Path>, reason: impl Into<String>) -> Self {

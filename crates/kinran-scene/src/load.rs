@@ -700,11 +700,7 @@ impl Loader<'_> {
     ) -> Result<Option<TextureRef>, Error> {
         match self.texture_ref(info, what) {
             Err(error) if group > self.needs.maps => {
-                let reason = match error {
-                    Error::Malformed { reason, .. } | Error::Unsupported { reason, .. } => reason,
-                    other => other.to_string(),
-                };
-                self.warn(format!("{reason}; it is left as it is"));
+                self.warn(format!("{}; it is left as it is", error.reason()));
                 Ok(None)
             }
             result => result,

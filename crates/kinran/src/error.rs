@@ -153,7 +153,7 @@ impl Error {
             | Error::Folder(FolderError::Image(error))
             | Error::Scene(kinran_scene::Error::Image(error))
             | Error::Unturned { error, .. } => of_image(error),
-            Error::Scene(kinran_scene::Error::Io { .. }) => "io",
+            Error::Scene(kinran_scene::Error::Io { .. } | kinran_scene::Error::Unreadable { .. }) => "io",
             Error::Scene(kinran_scene::Error::Malformed { .. }) => "malformed",
             Error::Scene(kinran_scene::Error::Unsupported { .. }) => "unsupported",
             Error::Scene(kinran_scene::Error::Outside { .. }) => "input",
