@@ -193,11 +193,11 @@ SETS = {
     "aorm": {"Rock_AORM.png": "Rock orm", "Rock_Normal.png": "Rock normal"},
     "ao_r_m": {"Rock_AO_R_M.png": "Rock orm", "Rock_Normal.png": "Rock normal"},
     "nra": {"Rock_NRA.png": "Rock other unused", "Rock_BC.png": "Rock color"},
-    "variants": {
-        "Wood_Normal.png": "Wood normal",
-        "Wood_Roughness.png": "Wood roughness",
-        "Wood_Color_Red.png": "unknown",
-        "Wood_Color_Blue.png": "unknown",
+    "cryengine": {"brick_diff.png": "brick color", "brick_ddna.png": "brick normal", "brick_rough.png": "brick roughness"},
+    "detail_normal": {
+        "tin_Normal.png": "tin normal",
+        "tin_DetailNormal.png": "tin other unused",
+        "tin_Roughness.png": "tin roughness",
     },
     "two_sizes": {
         "Wood_1K_Normal.png": "Wood normal",
@@ -206,8 +206,17 @@ SETS = {
         "Wood_2K_Roughness.png": "Wood roughness unused",
     },
 }
-# A map of the set is missing: what warnings must say.
+# A map of the set is missing or not understood: what warnings must say.
 INCOMPLETE = {
+    "variants": (
+        {
+            "Wood_Normal.png": "Wood normal",
+            "Wood_Roughness.png": "Wood roughness",
+            "Wood_Color_Red.png": "unknown",
+            "Wood_Color_Blue.png": "unknown",
+        },
+        ["Wood_Color_Red.png is called after it", "--ignore Wood_Color_Blue.png"],
+    ),
     "udim_of_two_sizes": (
         {
             "Head_Normal.1001.png": "Head_1001 normal",

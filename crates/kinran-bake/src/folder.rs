@@ -14,6 +14,7 @@ mod names;
 mod sets;
 mod twins;
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::f32::consts::TAU;
 use std::io::ErrorKind;
@@ -380,7 +381,8 @@ impl Found {
 }
 
 /// Finds the materials in a folder by the names of its image files, or where it has none in a folder called textures in it.
-/// Does not look into other folders, nor at hidden files; no image is read yet.
+/// Does not look into other folders, nor at hidden files; no image is read yet, but for the headers of several that are one
+/// map.
 ///
 /// # Errors
 /// [`FolderError`]: the folder cannot be read or has no maps, a flag makes no sense, or maps can be read in
@@ -417,7 +419,7 @@ pub fn scan_in(files: &dyn Files, folder: &Path, hints: &Hints) -> Result<Folder
             "" => folder_name(files, folder),
             stem => stem.to_owned(),
         };
-        let mut material = understand(&name, &mut group, hints)?;
+        let mut material = understand(files, &name, &mut group, hints)?;
         let constants = material.as_ref().map(|material| constant_rows(material, hints)).unwrap_or_default();
         if let Some(material) = material.as_mut() {
             material.warnings = assumptions(material, &group, hints, &strangers);
@@ -426,6 +428,10 @@ pub fn scan_in(files: &dyn Files, folder: &Path, hints: &Hints) -> Result<Folder
         result.rows.extend(constants);
         result.materials.extend(material);
     }
+    let unknown: Vec<String> = (strangers.iter())
+        .filter(|file| file.dropped.is_none() && !sets::is_picture_of(&file.path))
+        .map(|file| file.file.clone())
+        .collect();
     result.rows.extend(strangers.into_iter().map(|file| row_of("", file)));
     let no_picture = |file| Row {
         material: String::new(),
@@ -442,6 +448,7 @@ pub fn scan_in(files: &dyn Files, folder: &Path, hints: &Hints) -> Result<Folder
         return Err(FolderError::NoMaps { folder: folder.into(), seen });
     }
     warn_of_tiles(&mut result.materials);
+    warn_of_strangers(&mut result.materials, &unknown);
     name_layers(folder, hints, &mut result.materials)?;
     Ok(result)
 }
@@ -466,6 +473,28 @@ fn warn_of_tiles(materials: &mut [MaterialMaps]) {
             listed(of_tile)
         );
         material.warnings.push(warning);
+    }
+}
+
+/// Warns of pictures that are called after a material and are none of its maps by their names, such as a map of a role that
+/// is spelled in another way.
+fn warn_of_strangers(materials: &mut [MaterialMaps], unknown: &[String]) {
+    for file in unknown {
+        let lower = file_name(Path::new(file)).to_lowercase();
+        let is_called_after = |material: &&mut MaterialMaps| {
+            let rest = lower.strip_prefix(&material.name.to_lowercase());
+            rest.is_some_and(|rest| rest.starts_with(['_', '-', ' ']))
+        };
+        let longest = materials.iter_mut().filter(is_called_after).max_by_key(|material| material.name.len());
+        let Some(material) = longest.filter(|m| !m.warnings.iter().any(|told| told.contains(file.as_str())))
+        else {
+            continue;
+        };
+        material.warnings.push(format!(
+            "{}: {file} is called after it and is none of its maps by its name; say --map ROLE={file} if it is one, or \
+             --ignore {file}",
+            material.name
+        ));
     }
 }
 
@@ -721,7 +750,8 @@ fn apply_flags(
             return Err(FolderError::Flag { flag: flag(), reason });
         }
 
-        // The material is the file's own, or the one whose name the file's name begins with, or the only one.
+        // The material is the file's own or that of all its variants, or the one whose name the file's name begins with, or
+        // the only one.
         let mut stems: Vec<String> = Vec::new();
         for other in found.iter().enumerate().filter(|(i, f)| *i != at && f.role.is_some()) {
             let stem = &other.1.name.stem;
@@ -731,7 +761,7 @@ fn apply_flags(
         }
         let own = found[at].name.stem.to_lowercase();
         let known = stems.iter().any(|s| s.to_lowercase() == own);
-        if !known {
+        if !known && !sets::has_variants(found, &own) {
             let prefix = stems.iter().filter(|s| !s.is_empty() && own.starts_with(&s.to_lowercase()));
             let stem = match (prefix.max_by_key(|s| s.len()), stems.as_slice()) {
                 (Some(stem), _) | (None, [stem]) => stem.clone(),
@@ -853,6 +883,7 @@ fn constant_rows(material: &MaterialMaps, hints: &Hints) -> Vec<Row> {
 
 /// Makes a material of the files of one stem; none if nothing of them is used.
 fn understand(
+    place: &dyn Files,
     material: &str,
     files: &mut [Found],
     hints: &Hints,
@@ -896,9 +927,10 @@ fn understand(
         Metallic,
     ] {
         let question = format!("there are several {role} maps");
-        twins.extend(settle_twins(material, files, |r| r == role, &question, hints)?);
+        twins.extend(settle_twins(place, material, files, |r| r == role, &question, hints)?);
     }
-    twins.extend(settle_twins(material, files, Role::is_packed, "there are several packed maps", hints)?);
+    let question = "there are several packed maps";
+    twins.extend(settle_twins(place, material, files, Role::is_packed, question, hints)?);
     twins.extend(settle_gloss(material, files, hints)?);
 
     let at = |files: &[Found], role: Role| files.iter().position(|f| f.is(role));
@@ -1116,9 +1148,10 @@ fn settle_unread(material: &str, files: &mut [Found]) -> Result<(), FolderError>
     Ok(())
 }
 
-/// Of several files of a kind keeps the one forced; where none is and they have one role, the likeliest, whose twins the
-/// others are.
+/// Of several files of a kind keeps the one forced; where none is and they have one role, the largest or the likeliest,
+/// whose twins the others are.
 fn settle_twins(
+    place: &dyn Files,
     material: &str,
     files: &mut [Found],
     kind: impl Fn(Role) -> bool,
@@ -1142,18 +1175,29 @@ fn settle_twins(
     let (Some(role), true) = (role, forced.is_empty()) else {
         return Err(ambiguous(material, files, question, &at));
     };
-    // The one that points as asked for, one that says how it points, the one of 16 bits, the first.
+    // The largest, the one that points as asked for, one that says how it points, the one of 16 bits, the first.
     let wanted = hints.green.unwrap_or(Green::Up);
-    let rank = |&i: &usize| {
+    let texels: BTreeMap<usize, u64> = at
+        .iter()
+        .filter_map(|&i| {
+            let (width, height) = place.image_size(&files[i].path)?;
+            Some((i, u64::from(width) * u64::from(height)))
+        })
+        .collect();
+    // Headers that do not tell leave the names to decide.
+    let texels = |i: usize| if texels.len() == at.len() { texels[&i] } else { 0 };
+    let rank = |i: usize| {
         let name = &files[i].name;
-        (name.green != Some(wanted), name.green.is_none(), !name.deep, i)
+        (Reverse(texels(i)), name.green != Some(wanted), name.green.is_none(), !name.deep, i)
     };
-    let keep = at.iter().copied().min_by_key(rank).unwrap_or(at[0]);
+    let keep = at.iter().copied().min_by_key(|&i| rank(i)).unwrap_or(at[0]);
     let pair = |i: usize| files[i].name.green.is_some() && files[i].name.green != files[keep].name.green;
-    let whys: Vec<(usize, String)> = (at.into_iter().filter(|&i| i != keep))
+    let whys: Vec<(usize, String)> = (at.iter().copied().filter(|&i| i != keep))
         .map(|i| {
             let kept = &files[keep].file;
-            (i, if pair(i) { format!("the same normals as {kept}") } else { format!("the same as {kept}") })
+            let smaller = if texels(i) < texels(keep) { ", and smaller" } else { "" };
+            let what = if pair(i) { "the same normals as" } else { "the same as" };
+            (i, format!("{what} {kept}{smaller}"))
         })
         .collect();
     Ok(whys.into_iter().map(|(i, why)| twin(files, (role, keep), (role, i), why, false)).collect())

@@ -805,6 +805,17 @@ fn a_shared_map_has_a_row_of_each_material_and_a_layers_map_the_reason_why_it_is
         assert_eq!(row.channels, "R occlusion", "{row:?}");
         assert!(row.note.contains("shared by S_METALNESS and S_SPECULAR"), "{row:?}");
     }
+    // What a flag says of it is said of it in all of them, and goes before what one of them has.
+    for (role, named) in [(Role::Occlusion, "S_AO_2K.png"), (Role::Gloss, "S_NRM_2K.png")] {
+        let names = [&names[..], &["S_NRM_2K.png"]].concat();
+        let folder = scanned(&names, &maps(&[(role, named)])).unwrap();
+        let of = |material: &MaterialMaps| {
+            let is_it = |(own, path): &&(Role, PathBuf)| *own == role && file(path) == named;
+            material.files.iter().filter(is_it).count()
+        };
+        let taken: Vec<(&str, usize)> = folder.materials.iter().map(|m| (m.name.as_str(), of(m))).collect();
+        assert_eq!(taken, [("S_METALNESS", 1), ("S_SPECULAR", 1)], "{}", folder.table());
+    }
     for (file, role) in [
         ("coat_roughness.png", Role::Roughness),
         ("clearcoat_normal.png", Role::Normal),
@@ -1039,6 +1050,56 @@ fn two_normal_maps_are_told_apart_by_their_names() {
         for part in ["several normal maps, and their texels differ", "--map normal=w_nrm.png", "--ignore"] {
             assert!(error.contains(part), "wanted \"{part}\" in: {error}");
         }
+    }
+}
+
+/// The means of so many by so many texels.
+fn reduced(image: &Image, by: u32) -> Image {
+    let (width, height) = (image.width / by, image.height / by);
+    let mean = |x: u32, y: u32, c: usize| {
+        let texels = (0..by * by).map(|i| image.texel(x * by + i % by, y * by + i / by)[c]);
+        (texels.sum::<f32>() / (by * by) as f32 * 255.0).round() as u8
+    };
+    let texel = |i: u32| [0, 1, 2].map(|c| mean(i % width, i / width, c));
+    let samples: Vec<u8> = (0..width * height).flat_map(texel).collect();
+    Image::new(width, height, Channels::Rgb, Pixels::U8(samples)).unwrap()
+}
+
+/// One texture downloaded in two sizes.
+#[test]
+fn maps_of_two_sizes_are_said_to_differ_in_their_texels() {
+    let (up, down, rough) = (waves(Green::Up), waves(Green::Down), grey(0.5));
+    let other = image(64, Channels::Rgb, |u, _| {
+        let x = 0.6 * (TAU * 3.0 * u).sin();
+        [x * 0.5 + 0.5, 0.5, (1.0 - x * x).sqrt() * 0.5 + 0.5, 1.0]
+    });
+    for by in [2, 4] {
+        let small = reduced(&up, by);
+        let cases: [([(&str, &Image); 2], &str); 3] = [
+            ([("w_1K_normal.png", &small), ("w_2K_normal.png", &up)], "w_2K_normal.png"),
+            ([("w_2K_normal.png", &up), ("w_NormalGL.png", &small)], "w_2K_normal.png"),
+            ([("w_NormalDX.png", &down), ("w_NormalGL.png", &small)], "w_NormalDX.png"),
+        ];
+        for (files, wanted) in cases {
+            let files = [files[0], files[1], ("w_rough.png", &rough)];
+            let (used, loaded) = load_twins(&files, &Hints::default(), Role::Normal)
+                .unwrap_or_else(|e| panic!("{wanted}, {by} times smaller: {e}"));
+            assert_eq!(used, wanted, "{by} times smaller");
+            assert!(loaded.notes.is_empty(), "{wanted}: {:?}", loaded.notes);
+        }
+        // What differs does so at any size.
+        let files = [("w_1K_normal.png", &small), ("w_2K_normal.png", &other), ("w_rough.png", &rough)];
+        let error = load_one(&files, &Hints::default()).unwrap_err().to_string();
+        assert!(error.contains("their texels differ"), "{error}");
+    }
+    let odd = image(20, Channels::R, |u, _| [u; 4]);
+    for (role, first, second) in [("normal", &up, &reduced(&up, 3)), ("rough", &rough, &odd)] {
+        let names = [format!("w_1K_{role}.png"), format!("w_2K_{role}.png")];
+        let files = [(names[0].as_str(), first), (names[1].as_str(), second), ("w_color.png", &up)];
+        let error = load_one(&files, &Hints::default()).unwrap_err().to_string();
+        let (large, small) = (first.width.max(second.width), first.width.min(second.width));
+        let sizes = format!("of {large}x{large} and {small}x{small} texels");
+        assert!(error.contains(&sizes) && !error.contains("texels differ"), "wanted {sizes} in: {error}");
     }
 }
 

@@ -275,12 +275,23 @@ impl Apart {
     }
 }
 
-/// Compares two images in their first channels, or with none the x and y of normal maps, halved; `None` where their sizes
-/// differ. With `is_opposite` the second is turned over.
+/// How many texels along a side of `large` one of `small` stands for, where that is a whole number and the same for both
+/// sides.
+fn ratio(small: &Image, large: &Image) -> Option<u32> {
+    let ratio = large.width / small.width;
+    (ratio > 0 && (small.width * ratio, small.height * ratio) == (large.width, large.height)).then_some(ratio)
+}
+
+/// Compares two images in their first channels, or with none the x and y of normal maps, halved; one may be a whole number
+/// of times as large as the other, `None` where their sizes differ otherwise. With `is_opposite` the second is turned over.
 pub(super) fn apart(a: &Image, b: &Image, channels: usize, is_opposite: bool) -> Option<Apart> {
-    if (a.width, a.height) != (b.width, b.height) {
-        return None;
-    }
+    // Squares of the larger one, and what they are in the other.
+    let squares = |ratio: u32| (SQUARE / ratio as usize).max(1);
+    let sides = match (ratio(b, a), ratio(a, b)) {
+        (Some(larger), _) => [larger as usize * squares(larger), squares(larger)],
+        (_, Some(larger)) => [squares(larger), larger as usize * squares(larger)],
+        (None, None) => return None,
+    };
     let is_normal = channels == 0;
     let signed = [a, b].map(is_signed);
     let value = |sample: f32, signed: bool| match is_normal {
@@ -288,15 +299,16 @@ pub(super) fn apart(a: &Image, b: &Image, channels: usize, is_opposite: bool) ->
         false => f64::from(sample),
     };
     let used = if is_normal { 2 } else { channels };
-    let (width, height) = (a.width as usize, a.height);
-    let rows = in_rows(a, 0..height.div_ceil(SQUARE as u32), |band| {
-        let mut means = vec![[[0.0f64; 3]; 2]; width.div_ceil(SQUARE)];
-        let band = band * SQUARE as u32..height.min((band + 1) * SQUARE as u32);
+    let columns = (a.width as usize).div_ceil(sides[0]);
+    let rows = in_rows(a, 0..a.height.div_ceil(sides[0] as u32), |band| {
+        let mut means = vec![[[0.0f64; 3]; 2]; columns];
         let mut texels = Vec::new();
         for (which, image) in [a, b].into_iter().enumerate() {
+            let side = sides[which] as u32;
+            let band = band * side..image.height.min((band + 1) * side);
             for y in band.clone() {
                 image.row_rgba_f32(y, &mut texels);
-                for (square, mean) in texels.chunks(SQUARE).zip(&mut means) {
+                for (square, mean) in texels.chunks(sides[which]).zip(&mut means) {
                     let weight = 1.0 / (square.len() * band.len()) as f64;
                     for texel in square {
                         for (mean, sample) in mean[which].iter_mut().zip(texel).take(used) {
@@ -315,7 +327,7 @@ pub(super) fn apart(a: &Image, b: &Image, channels: usize, is_opposite: bool) ->
         }
         row
     });
-    let texels = (rows.len() * width.div_ceil(SQUARE)).max(1) as f64;
+    let texels = (rows.len() * columns).max(1) as f64;
     let sum = rows.iter().fold(Sums::default(), |sum, row| sum.and(row));
     let mean_square = |squares: f64| (squares / (texels * used as f64)).sqrt();
     let variances = sum.first.iter().zip(&sum.squares).take(used);

@@ -265,8 +265,20 @@ fn role_of(word: &str) -> Option<(Role, Option<Green>)> {
 }
 
 /// What normal maps are called.
-const NORMAL_WORDS: [&str; 10] =
-    ["normals", "normalmap", "normalbump", "normal", "norm", "nor", "nrml", "nrm", "nml", "nmap"];
+const NORMAL_WORDS: [&str; 12] = [
+    "normals",
+    "normalmap",
+    "normalbump",
+    "normal",
+    "norm",
+    "nor",
+    "nrml",
+    "nrm",
+    "nml",
+    "nmap",
+    "ddn",
+    "ddna",
+];
 
 /// What stands behind it where green points up, and down.
 const UP_WORDS: [&str; 3] = ["gl", "ogl", "opengl"];
@@ -284,7 +296,7 @@ const WORDS: [(Role, &[&str]); 25] = [
     ),
     (Role::DirectionAngle, &["anisotropyangle", "anisoangle"]),
     (Role::AnisotropyLevel, &["anisotropylevel", "anisolevel"]),
-    (Role::Anisotropy, &["anisotropy", "specularanisotropy"]),
+    (Role::Anisotropy, &["anisotropy", "anisotropic", "specularanisotropy"]),
     (Role::Aniso, &["aniso"]),
     (
         Role::Color,
@@ -367,6 +379,8 @@ const WORDS: [(Role, &[&str]); 25] = [
             "ior",
             "specularior",
             "specularrotation",
+            "anisotropicrotation",
+            "anisotropyrotation",
             "diffuseroughness",
             "worldspacenormal",
             "worldspacenormals",
@@ -387,8 +401,8 @@ const WORDS: [(Role, &[&str]); 25] = [
 ];
 
 /// Layers beside the base, whose maps are none of the base's: Standard Surface, OpenPBR, Substance, glTF.
-const LAYERS: [&str; 8] =
-    ["coat", "clearcoat", "sheen", "fuzz", "subsurface", "transmission", "iridescence", "thinfilm"];
+const LAYERS: [&str; 9] =
+    ["coat", "clearcoat", "sheen", "fuzz", "subsurface", "transmission", "iridescence", "thinfilm", "detail"];
 
 /// What stands behind a layer besides names of normal, roughness, gloss, anisotropy and opacity maps.
 const OF_LAYERS: [&str; 11] = [

@@ -2,6 +2,7 @@
 //! name a variant or a tile.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use super::names::{Name, WORKFLOWS, is_udim};
 use super::{Found, Role, add_note};
@@ -12,6 +13,17 @@ const SET_OF_A_ROLE: usize = 3;
 
 /// Words behind a role that name a picture of a map, and no map.
 const PICTURES_OF: [&str; 6] = ["preview", "thumb", "thumbnail", "icon", "render", "sphere"];
+
+/// Whether one of a name's words is for a picture of a map.
+fn names_picture(words: &str) -> bool {
+    let mut words = words.split(|c: char| !c.is_alphanumeric());
+    words.any(|word| PICTURES_OF.iter().any(|other| word.eq_ignore_ascii_case(other)))
+}
+
+/// Whether a file is a picture of a material by its name.
+pub(super) fn is_picture_of(file: &Path) -> bool {
+    file.file_stem().is_some_and(|stem| names_picture(&stem.to_string_lossy()))
+}
 
 /// Chooses among the readings of each file's name by those of the others.
 pub(super) fn settle(found: &mut [Found]) {
@@ -59,12 +71,16 @@ pub(super) fn settle(found: &mut [Found]) {
     }
 }
 
-/// Gives maps without words behind their role to the variants of their material, where there are several and none has such
-/// a map: Poliigon's two workflows have one occlusion.
-pub(super) fn share(found: &mut [Found]) {
-    // Variants by the material's name in lower case: their names, and their roles together.
-    let mut variants: BTreeMap<String, (BTreeSet<String>, BTreeSet<Role>)> = BTreeMap::new();
-    let is_map = |file: &Found| file.dropped.is_none() && file.role.is_some_and(Role::is_used);
+/// The variants of a material: their names, and their roles together.
+type Variants = (BTreeSet<String>, BTreeSet<Role>);
+
+fn is_map(file: &Found) -> bool {
+    file.dropped.is_none() && file.role.is_some_and(Role::is_used)
+}
+
+/// Variants by the material's name in lower case, where there are several.
+fn variants(found: &[Found]) -> BTreeMap<String, Variants> {
+    let mut variants: BTreeMap<String, Variants> = BTreeMap::new();
     for file in found.iter().filter(|file| is_map(file) && !is_tile(&file.name.tail)) {
         let ending = format!("_{}", file.name.tail);
         let Some(stem) = file.name.stem.strip_suffix(&ending).filter(|_| !file.name.tail.is_empty()) else {
@@ -76,9 +92,22 @@ pub(super) fn share(found: &mut [Found]) {
         }
         roles.extend(file.role);
     }
-    for (stem, (names, roles)) in variants.into_iter().filter(|(_, (names, _))| names.len() > 1) {
+    variants.retain(|_, (names, _)| names.len() > 1);
+    variants
+}
+
+/// Whether a material has several variants.
+pub(super) fn has_variants(found: &[Found], stem: &str) -> bool {
+    variants(found).contains_key(&stem.to_lowercase())
+}
+
+/// Gives maps without words behind their role to the variants of their material, where there are several and none has such
+/// a map, or a flag names it: Poliigon's two workflows have one occlusion.
+pub(super) fn share(found: &mut [Found]) {
+    for (stem, (names, roles)) in variants(found) {
         let is_of_it = |file: &Found| is_map(file) && file.name.stem.to_lowercase() == stem;
-        if found.iter().any(|file| is_of_it(file) && file.role.is_some_and(|role| roles.contains(&role))) {
+        let is_twice = |file: &Found| !file.forced && file.role.is_some_and(|role| roles.contains(&role));
+        if found.iter().any(|file| is_of_it(file) && is_twice(file)) {
             continue;
         }
         let list: Vec<String> = names.into_iter().collect();
@@ -179,10 +208,7 @@ impl Sets {
 
     /// Whether a name without a role at its end may be read with a tail.
     fn accepts_unknown(&self, name: &Name) -> bool {
-        let is_picture = || {
-            name.tail.split('_').any(|word| PICTURES_OF.iter().any(|other| word.eq_ignore_ascii_case(other)))
-        };
-        is_tile(&name.tail) || (self.roles(&name.stem, &name.tail) >= SET && !is_picture())
+        is_tile(&name.tail) || (self.roles(&name.stem, &name.tail) >= SET && !names_picture(&name.tail))
     }
 
     /// Whether what looks like a role at a name's end, where the material would be called `whole`, is a word of the set.

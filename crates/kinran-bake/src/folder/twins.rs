@@ -51,14 +51,17 @@ impl MaterialMaps {
             }
             let channels = if twin.role == Role::Color { 3 } else { 1 };
             let distance = apart(&used, &other, channels, twin.is_opposite);
-            if !distance.is_none_or(|d| d.is_far(d.plain)) {
-                continue;
-            }
             let (question, differ) = match twin.is_opposite {
                 true => ("there are both roughness and gloss", "one is not the other's opposite"),
                 false => ("there are several files for one map", "their texels differ"),
             };
-            return Err(self.cannot_tell(twin, &format!("{question}, and {differ}")));
+            match distance {
+                Some(distance) if !distance.is_far(distance.plain) => {}
+                Some(_) => return Err(self.cannot_tell(twin, &format!("{question}, and {differ}"))),
+                None => {
+                    return Err(self.cannot_tell(twin, &format!("{question}, {}", of_sizes(&used, &other))));
+                }
+            }
         }
         Ok(maps)
     }
@@ -73,10 +76,13 @@ impl MaterialMaps {
         notes: &mut Vec<String>,
     ) -> Result<(), FolderError> {
         let Some(normal) = &mut maps.normal else { return Ok(()) };
-        let distance = apart(used, other, 0, false);
-        let Some(distance) = distance.filter(|d| !d.is_far(d.plain.min(d.turned))) else {
-            return Err(self.cannot_tell(twin, "there are several normal maps, and their texels differ"));
+        let Some(distance) = apart(used, other, 0, false) else {
+            let question = format!("there are several normal maps, {}", of_sizes(used, other));
+            return Err(self.cannot_tell(twin, &question));
         };
+        if distance.is_far(distance.plain.min(distance.turned)) {
+            return Err(self.cannot_tell(twin, "there are several normal maps, and their texels differ"));
+        }
         let turned = distance.turned < distance.plain;
         let correlation = green_correlation(used);
         let seen = match guess_by_correlation(correlation) {
@@ -124,4 +130,12 @@ impl MaterialMaps {
             ),
         }
     }
+}
+
+/// Part of a question about images that cannot be compared.
+fn of_sizes(a: &Image, b: &Image) -> String {
+    format!(
+        "of {}x{} and {}x{} texels, and neither size is a multiple of the other",
+        a.width, a.height, b.width, b.height
+    )
 }
