@@ -514,6 +514,13 @@ impl Manifest {
 
     fn setting(&self, key: &Spanned<Cow<str>>, value: &Spanned<DeValue>) -> Result<Setting, ManifestError> {
         let text = |value: &Spanned<DeValue>| match value.get_ref() {
+            DeValue::String(text) if key.get_ref() == "layer" => {
+                let (tile, rest) = text.split_once(',').unwrap_or((text, ""));
+                let rest = rest.split(',').map(str::trim).filter(|part| !part.is_empty());
+                let parts = rest.map(|part| part.split_once('=').unwrap_or((part, "")));
+                let parts = parts.map(|(name, value)| (name.trim().to_owned(), value.trim().to_owned()));
+                Ok((self.layer_of(value, tile.trim(), parts.collect())?, value.span()))
+            }
             DeValue::String(text) => Ok((text.to_string(), value.span())),
             DeValue::Integer(number) => Ok((number.to_string(), value.span())),
             DeValue::Float(number) => Ok((number.to_string(), value.span())),
@@ -538,11 +545,30 @@ impl Manifest {
             let expected = "this layer has no `tile`; expected a file or the name of a [tile.NAME]";
             return Err(self.error(&value.span(), expected.into()));
         };
-        let mut file = parts.remove(tile).1;
-        if let Some((of, defaults)) = self.tiles.get(&file) {
+        let tile = parts.remove(tile).1;
+        self.layer_of(value, &tile, parts)
+    }
+
+    /// The flag of a layer whose tile is a file, or called by its name.
+    fn layer_of(
+        &self,
+        value: &Spanned<DeValue>,
+        tile: &str,
+        mut parts: Parts,
+    ) -> Result<String, ManifestError> {
+        let mut file = tile.to_owned();
+        if let Some((of, defaults)) = self.tiles.get(tile) {
             file.clone_from(of);
             let own: BTreeSet<String> = parts.iter().map(|(name, _)| name.clone()).collect();
             parts.extend(defaults.iter().filter(|(name, _)| !own.contains(name)).cloned());
+        } else if !has_image_extension(Path::new(tile)) {
+            let known: Vec<String> = self.tiles.keys().map(|name| format!("[tile.{name}]")).collect();
+            let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+            let message = format!(
+                "\"{tile}\" is neither the file of an image nor the name of a tile; add [tile.{tile}] with its \
+                 `file`, or name one that is there: {known}"
+            );
+            return Err(self.error(&value.span(), message));
         }
         let parts = parts.into_iter().map(|(name, value)| match value.as_str() {
             "" => format!(",{name}"),

@@ -61,6 +61,18 @@ fn a_mistake_is_told_without_its_place_or_what_was_expected() {
         ("[[detail]]\ninput = \"a\"\nlayer = [{ scale = 2 }]\n", 3, 10, "this layer has no `tile`"),
         ("[[detail]]\ninput = \"a\"\nlayer = [{ tile = \"a,b\" }]\n", 3, 19, "a comma cannot stand here"),
         ("[[detail]]\ninput = \"a\"\nlayer = [{ tile = [1] }]\n", 3, 19, "found an array"),
+        (
+            "[[detail]]\ninput = \"a\"\nlayer = [{ tile = \"steel\" }]\n",
+            3,
+            10,
+            "add [tile.steel] with its `file`",
+        ),
+        (
+            "[tile.iron]\nfile = \"i.png\"\n[[detail]]\ninput = \"a\"\nlayer = [\"steel,scale=2\"]\n",
+            5,
+            10,
+            "or name one that is there: [tile.iron]",
+        ),
         ("", 1, 1, "nothing to bake; expected [[aniso]]"),
     ] {
         let (l, c, message, _) = refused(text);
