@@ -113,6 +113,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
             match start_threads(threads).and_then(|()| do_command(&command, &console)) {
                 Ok(()) => ExitCode::SUCCESS,
                 Err(error) => {
+                    kinran_image::remove_empty_folders();
                     console.failure(&error);
                     ExitCode::from(error.exit_code())
                 }

@@ -642,7 +642,7 @@ impl Comparison {
     /// # Errors
     /// [`Error::Image`] where the folder or a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), Error> {
-        std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
+        kinran_image::make_folder(folder)?;
         for series in &self.series {
             for (picture, difference) in series.pictures.iter().zip(&self.report.methods[0].distances) {
                 picture.write(&folder.join(picture_file(series.name, difference.distance)))?;

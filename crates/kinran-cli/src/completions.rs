@@ -63,7 +63,7 @@ pub fn run_man(args: &ManArgs, console: &Console) -> Result<(), Error> {
     command.build();
     let Some(folder) = &args.output else { return print(page(&Man::new(command))?, console) };
     outputs::check_folder(folder)?;
-    std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
+    kinran_image::make_folder(folder)?;
     let mut files = Vec::new();
     write_pages(&command, folder, &mut files)?;
     let text = format!("{} pages are in {}", files.len(), folder.display());

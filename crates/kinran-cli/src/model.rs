@@ -99,8 +99,9 @@ impl Place {
             return Ok(Place::File(path.into()));
         }
         let mut files = Vec::new();
-        for entry in std::fs::read_dir(path).map_err(|e| complain(&e))? {
-            files.push(entry.map_err(|e| complain(&e))?.path());
+        let io = |e| kinran_image::Error::io(path, e);
+        for entry in std::fs::read_dir(path).map_err(io)? {
+            files.push(entry.map_err(io)?.path());
         }
         files.sort();
         let ends = |file: &Path, ending: &str| file.to_string_lossy().to_ascii_lowercase().ends_with(ending);

@@ -2,6 +2,7 @@
 //! that can be refused is refused before long work, not after it.
 
 use std::collections::BTreeSet;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use kinran::report::{KnownFiles, WrittenFile};
@@ -45,8 +46,8 @@ pub(crate) fn tell_place(console: &Console, named: Option<&Path>, place: &Path) 
     }
 }
 
-/// Refuses a file whose extension is not among `extensions`, that is a folder, or that cannot appear in its
-/// folder.
+/// Refuses a file whose extension is not among `extensions`, that is a folder, or whose folder neither exists nor can be
+/// made; [`make_place`] makes it.
 pub(crate) fn check_file(path: &Path, extensions: &[&str]) -> Result<(), Error> {
     if !extensions.iter().any(|e| has_extension(path, e)) {
         let wanted = extensions.iter().map(|e| format!(".{e}")).collect::<Vec<_>>().join(" or ");
@@ -55,14 +56,16 @@ pub(crate) fn check_file(path: &Path, extensions: &[&str]) -> Result<(), Error> 
     if path.is_dir() {
         return Err(Error::file_error(path, "is a folder; name a file"));
     }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if !folder.is_dir() {
-        return Err(Error::file_error(
-            path,
-            format!("there is no folder {}; make it first", folder.display()),
-        ));
-    }
-    check_writable(folder)
+    check_folder(folder_of(path))
+}
+
+/// Makes the folder of a file that is to be written.
+pub(crate) fn make_place(path: &Path) -> Result<(), Error> {
+    Ok(kinran_image::make_folder(folder_of(path))?)
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Refuses a folder that neither exists nor can be made, or that cannot be written to.
@@ -84,10 +87,12 @@ fn existing_folder(path: &Path) -> PathBuf {
 
 fn check_writable(folder: &Path) -> Result<(), Error> {
     // A file without a name: a process that is killed here leaves nothing behind.
-    tempfile::tempfile_in(folder)
-        .map(drop)
+    tempfile::tempfile_in(folder).map(drop).map_err(|e| match e.kind() {
+        // Folders of the system's own, as /proc.
+        ErrorKind::NotFound => Error::file_error(folder, "no file can be made in this folder; name another"),
         // The error itself would name the temporary file.
-        .map_err(|e| kinran_image::Error::io(folder, e.kind().into()).into())
+        kind => kinran_image::Error::io(folder, kind.into()).into(),
+    })
 }
 
 /// Refuses to write a file over one that the work is made from.

@@ -995,6 +995,7 @@ fn an_interrupted_bake_leaves_temporary_files() {
     let undisturbed = started.elapsed();
     let mut interrupted = 0;
     for i in 0..30 {
+        fs::remove_dir_all(&output).unwrap_or_default();
         let mut process = bake();
         std::thread::sleep(undisturbed.mul_f64(f64::from(i) / 30.0));
         Command::new("kill").args(["-INT", &process.id().to_string()]).status().unwrap();
@@ -1002,9 +1003,13 @@ fn an_interrupted_bake_leaves_temporary_files() {
         // Before it has said what to do at Ctrl-C there is nothing to remove.
         assert!(matches!(code, Some(0 | 130) | None), "{code:?}");
         interrupted += u32::from(code == Some(130));
+        let is_empty = |folder: &Path| fs::read_dir(folder).is_ok_and(|mut files| files.next().is_none());
+        assert!(!is_empty(&output), "an empty folder after interruption {i}");
         assert_eq!(temporary(&output), Vec::<String>::new(), "after interruption {i}");
     }
     assert!(interrupted > 5, "{interrupted} of 30 were interrupted");
+
+    bake().wait().unwrap();
 
     // What a dead process has left goes; what somebody is at work on, or has called so, stays.
     let dead = output.join(".kinran-0123456789abcdef.part");

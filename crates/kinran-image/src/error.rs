@@ -42,17 +42,24 @@ impl Error {
     }
 }
 
-/// What the operating system says of a file, and what a person can do about it.
+/// What the operating system says of a file, in words without its numbers, and what a person can do about it.
 pub fn io_reason(error: &std::io::Error) -> String {
-    let fix = match error.kind() {
-        ErrorKind::NotFound => return "there is no such file or folder".into(),
+    let words = match error.kind() {
+        ErrorKind::NotFound => "there is no such file or folder",
+        ErrorKind::AlreadyExists => "a file of this name is in the way; move it away, or name another place",
+        ErrorKind::NotADirectory => "a part of this path is a file and no folder; name another place",
+        ErrorKind::IsADirectory => "is a folder; name a file in it",
+        ErrorKind::InvalidFilename => "no file can have this name, or it is too long; name another",
         ErrorKind::PermissionDenied => {
-            "; change the permissions of the file and its folder, or choose another"
+            "permission denied; change the permissions of the file and its folder, or choose another"
         }
-        ErrorKind::ReadOnlyFilesystem => "; choose a folder on a writable disk",
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "; free some space or choose another disk",
-        ErrorKind::IsADirectory => "; name a file in it",
-        _ => "",
+        ErrorKind::ReadOnlyFilesystem => "the disk is read-only; choose a folder on a writable disk",
+        ErrorKind::StorageFull => "the disk is full; free some space or choose another disk",
+        ErrorKind::QuotaExceeded => "the quota is used up; free some space or choose another disk",
+        _ => {
+            let said = error.to_string();
+            return said.split_once(" (os error ").map_or(said.clone(), |(words, _)| words.to_owned());
+        }
     };
-    format!("{error}{fix}")
+    words.into()
 }

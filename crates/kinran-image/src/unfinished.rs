@@ -7,7 +7,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crate::Error;
+
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Folders that [`make_folder`] made, those above others first.
+static MADE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// As long as it lives, its file or folder counts as unfinished.
 #[derive(Debug)]
@@ -20,7 +25,7 @@ impl Unfinished {
     /// # Errors
     /// What `make` returns.
     pub fn make<T: AsRef<Path>>(make: impl FnOnce() -> io::Result<T>) -> io::Result<(Unfinished, T)> {
-        let mut unfinished = lock();
+        let mut unfinished = lock(&UNFINISHED);
         let made = make()?;
         unfinished.insert(made.as_ref().to_path_buf());
         let guard = Unfinished(made.as_ref().to_path_buf());
@@ -30,14 +35,40 @@ impl Unfinished {
 
 impl Drop for Unfinished {
     fn drop(&mut self) {
-        lock().remove(&self.0);
+        lock(&UNFINISHED).remove(&self.0);
     }
 }
 
-/// Removes all that is unfinished. From then on whoever begins or ends something new waits for ever: nothing but the end
-/// of the process may follow.
+/// Makes a folder, and those above it that are not there.
+///
+/// # Errors
+/// [`Error::Io`] where that cannot be.
+pub fn make_folder(path: impl AsRef<Path>) -> Result<(), Error> {
+    let path = path.as_ref();
+    let mut made = lock(&MADE);
+    let is_missing = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
+    let missing: Vec<&Path> = path.ancestors().take_while(is_missing).collect();
+    let result = fs::create_dir_all(path).map_err(|e| Error::io(path, e));
+    made.extend(missing.into_iter().rev().map(Path::to_path_buf));
+    result
+}
+
+/// Removes those of the folders that [`make_folder`] made in which nothing stands: work that failed leaves none behind.
+pub fn remove_empty_folders() {
+    remove_empty(&lock(&MADE));
+}
+
+fn remove_empty(made: &[PathBuf]) {
+    for folder in made.iter().rev() {
+        // One that holds something is refused by the system.
+        let _ = fs::remove_dir(folder);
+    }
+}
+
+/// Removes all that is unfinished, and folders that are still empty. From then on whoever begins or ends something new
+/// waits for ever: nothing but the end of the process may follow.
 pub fn remove_unfinished() {
-    let unfinished = lock();
+    let (unfinished, made) = (lock(&UNFINISHED), lock(&MADE));
     for path in unfinished.iter() {
         // Who writes into a folder at this moment may be faster once or twice.
         for _ in 0..5 {
@@ -47,9 +78,10 @@ pub fn remove_unfinished() {
             }
         }
     }
-    std::mem::forget(unfinished);
+    remove_empty(&made);
+    std::mem::forget((unfinished, made));
 }
 
-fn lock() -> MutexGuard<'static, BTreeSet<PathBuf>> {
-    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock<T>(mutex: &'static Mutex<T>) -> MutexGuard<'static, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -70,7 +70,7 @@ impl Sink for OutputFolder {
         }
         let path = self.path.join(name);
         let folder = path.parent().unwrap_or(&self.path);
-        std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
+        kinran_image::make_folder(folder)?;
         Ok(write_atomically(&path, bytes)?)
     }
 

@@ -99,7 +99,7 @@ impl Maps {
     /// # Errors
     /// [`Error::Image`] where the folder or a file cannot be written.
     pub(super) fn write(&self, folder: &Path, name: &str) -> Result<(), Error> {
-        std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
+        kinran_image::make_folder(folder)?;
         let maps = [
             ("baseColor", &self.base_color),
             ("normal", &self.normal),

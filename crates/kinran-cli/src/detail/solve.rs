@@ -607,7 +607,7 @@ fn write_textures(
     tiles: &Tiles,
     writing: &Stage,
 ) -> Result<Vec<String>, Error> {
-    std::fs::create_dir_all(args.output()).map_err(|e| kinran_image::Error::io(args.output(), e))?;
+    kinran_image::make_folder(args.output())?;
     let mut files = Vec::new();
     let mut write = |name: String, texture: &kinran_image::Texture, map: Content| -> Result<(), Error> {
         let mut texture = texture.clone();

@@ -320,7 +320,7 @@ impl Work {
 /// # Errors
 /// [`Error::Image`] when it cannot be written.
 pub(super) fn fill_shader_folder(folder: &Path) -> Result<(), Error> {
-    std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
+    kinran_image::make_folder(folder)?;
     for (name, text) in ShaderSource::files() {
         let path = folder.join(name);
         if !path.exists() {

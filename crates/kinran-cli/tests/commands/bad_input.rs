@@ -2,7 +2,7 @@
 
 use std::process::{Command, Stdio};
 
-use crate::common::{files, glb, refused, square, text};
+use crate::common::{files, glb, kinran, refused, square, text};
 
 #[test]
 fn models_that_cannot_be_read_are_named() {
@@ -55,16 +55,38 @@ fn outputs_that_cannot_be_written_are_refused_before_any_work() {
     let render = |out: &str, parts: &[&str]| refused(&["render", text(&model), "-o", out], parts);
     render(text(&folder.path().join("p.jpg")), &["p.jpg", ".png or .exr"]);
     render(text(&folder.path().join("p")), &["must end in"]);
-    render(text(&folder.path().join("nowhere/p.png")), &["nowhere", "make it first"]);
     std::fs::create_dir(folder.path().join("p.png")).unwrap();
     render(text(&folder.path().join("p.png")), &["p.png", "is a folder"]);
     refused(&["compare", text(&model), "-o", text(&model)], &["square.glb", "is a file"]);
+    render(text(&model.join("p.png")), &["square.glb", "is a file; name a folder"]);
     assert_eq!(files(folder.path()), ["p.png", "square.glb"]);
     // A folder where not even root can write.
     if cfg!(target_os = "linux") {
         render("/proc/p.png", &["/proc"]);
         refused(&["compare", text(&model), "-o", "/proc/kinran/c"], &["/proc"]);
     }
+}
+
+/// A picture of a model that has no folder yet, and one whose making fails.
+#[test]
+fn a_folder_must_be_made_by_hand_or_stays_behind_empty() {
+    let (folder, model) = square();
+    let place = |name: &str| folder.path().join(name);
+    let small = ["--size", "8", "--spp", "1"];
+    for name in ["a/b/p.png", "c/p.exr"] {
+        let said = kinran(&[&["render", text(&model), "-o", text(&place(name))], &small[..]].concat());
+        assert!(said.code == Some(0) && place(name).is_file(), "{name}: {}", said.err);
+    }
+    let (table, plots) = (place("d/table.exr"), place("e/plots.svg"));
+    let fit = ["fit", "fuzz", "--tilt", "30", "--spread", "0.2", "--table", text(&table), "--plots"];
+    let said = kinran(&[&fit[..], &[text(&plots)]].concat());
+    assert!(said.code == Some(0) && table.is_file() && plots.is_file(), "{}", said.err);
+
+    // A folder in the place of a picture, of which nobody knows before it is written.
+    let none = place("f/g");
+    refused(&["render", text(&place("gone.glb")), "-o", text(&none.join("p.png"))], &["gone.glb"]);
+    refused(&["detail", "report", text(folder.path()), "-o", text(&none)], &["no folder with maps"]);
+    assert!(!place("f").exists(), "an empty folder stayed behind");
 }
 
 #[test]

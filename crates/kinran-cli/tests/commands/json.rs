@@ -290,7 +290,7 @@ fn a_file_or_flag_is_told_in_words_alone() {
         (vec!["render", gone], gone, ""),
         (vec!["render", "torn.glb"], "torn.glb", ""),
         (vec!["render", model, "-o", "p.gif"], "p.gif", ""),
-        (vec!["render", model, "-o", "gone/p.png"], "gone/p.png", ""),
+        (vec!["render", model, "-o", "notes.txt/p.png"], "notes.txt", ""),
         (vec!["render", model, "--env", "gone.hdr"], "gone.hdr", ""),
         (vec!["render", model, "--env", "torn.exr"], "torn.exr", ""),
         (vec!["render", model, "--camera", "3"], model, "--camera"),

@@ -205,7 +205,7 @@ impl Copies {
             let allowed = model.allowed()?.iter().map(|folder| self.place(folder));
             let allowed: Vec<PathBuf> = allowed.collect::<Result<_, Error>>()?;
             for folder in &allowed {
-                fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
+                kinran_image::make_folder(folder)?;
             }
             model.allow_outside = allowed;
         }
