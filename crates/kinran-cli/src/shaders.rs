@@ -41,7 +41,8 @@ pub struct Args {
     #[arg(long)]
     pub force: bool,
 
-    /// This module and those it needs, and no others; without --output they are printed
+    /// This module, or those of this name's group such as fuzz or skin, and those they need, and no others; without
+    /// --output they are printed
     #[arg(long, value_name = "NAME")]
     pub module: Option<String>,
 
@@ -61,7 +62,7 @@ pub enum Language {
     #[serde(rename = "glsl-450")]
     Glsl450,
     /// OpenGL ES 3 and WebGL 2.
-    #[value(name = "glsl-es-300")]
+    #[value(name = "glsl-es-300", aliases = ["glsl-es", "essl"])]
     #[serde(rename = "glsl-es-300")]
     GlslEs300,
     /// Direct3D, Unity, Unreal.
@@ -169,20 +170,31 @@ fn chosen(language: Language, name: Option<&str>) -> Result<Vec<Module>, Error> 
             "SPIR-V comes as one module; leave the flag out",
         ));
     }
-    if !modules.iter().any(|module| module.name == name) {
+    let mut wanted = named(modules, name);
+    if wanted.is_empty() {
         let names: Vec<_> = modules.iter().map(|module| module.name).collect();
         return Err(Error::flag_error(
             format!("--module {name}"),
             format!("choose one of {}", names.join(", ")),
         ));
     }
-    let mut wanted = vec![name];
     for module in modules.iter().rev() {
         if wanted.contains(&module.name) {
             wanted.extend(module.needs);
         }
     }
     Ok(modules.iter().filter(|module| wanted.contains(&module.name)).copied().collect())
+}
+
+/// The module of a name, or all whose names begin with it and an underscore.
+fn named(modules: &[Module], name: &str) -> Vec<&'static str> {
+    let all = || modules.iter().map(|module| module.name);
+    match all().find(|module| *module == name) {
+        Some(module) => vec![module],
+        None => all()
+            .filter(|module| module.strip_prefix(name).is_some_and(|rest| rest.starts_with('_')))
+            .collect(),
+    }
 }
 
 /// The text of the modules in one, as far as the language has that.
@@ -194,7 +206,11 @@ fn text(language: Language, name: Option<&str>, chosen: &[Module]) -> Result<Str
         // Imports are WESL's way to say what a module needs.
         (Language::Wesl, Some(name)) => {
             let module = chosen.iter().find(|module| module.name == name);
-            Ok(module.map(|module| module.text.to_owned()).unwrap_or_default())
+            module.map(|module| module.text.to_owned()).ok_or_else(|| {
+                let reason =
+                    "names several modules, which are files; give a folder by --output, or name one of them";
+                Error::flag_error(format!("--module {name}"), reason)
+            })
         }
         (Language::Wesl, None) => Err(Error::flag_error(
             "--lang wesl",
@@ -230,7 +246,7 @@ fn write(
         let reason = "is there with another content; give each language a folder of its own with --output, or overwrite it with --force";
         return Err(Error::file_error(folder.join(name), reason));
     }
-    std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
+    kinran_image::make_folder(folder)?;
     for (name, bytes) in &files {
         write_atomically(&folder.join(name), bytes)?;
     }

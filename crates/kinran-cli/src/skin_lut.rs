@@ -128,9 +128,9 @@ fn triple(text: &str) -> Result<[f64; 3], String> {
 }
 
 fn table_size(text: &str) -> Result<(u32, u32), String> {
-    match size(text)? {
-        (w, h) if (2..=4096).contains(&w) && (2..=4096).contains(&h) => Ok((w, h)),
-        _ => Err("a table has 2 to 4096 texels along a side".into()),
+    match size(text) {
+        Ok((w, h)) if (2..=4096).contains(&w) && (2..=4096).contains(&h) => Ok((w, h)),
+        _ => Err("write WIDTHxHEIGHT, such as 512x512, each 2 to 4096".into()),
     }
 }
 

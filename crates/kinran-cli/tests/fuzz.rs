@@ -38,6 +38,11 @@ fn fits_are_printed_as_a_table_as_json_and_as_constants() {
         ("wgsl", "const FUZZ_P_S = array<f32, 6>("),
         ("hlsl", "static const float FUZZ_P_S[6] = {"),
         ("glsl", "const float FUZZ_P_S[6] = float[6]("),
+        ("msl", "constant float FUZZ_P_S[6] = {"),
+        // As `kinran shaders` calls them.
+        ("glsl-450", "const float FUZZ_P_S[6] = float[6]("),
+        ("glsl-es-300", "const float FUZZ_P_S[6] = float[6]("),
+        ("wesl", "const FUZZ_P_S = array<f32, 6>("),
     ] {
         let (ok, text, _) = kinran(&["fit", "fuzz", "--tilt", "30", "--spread", "0.2", "--lang", language]);
         assert!(ok && text.contains(wanted), "{language}: {text}");

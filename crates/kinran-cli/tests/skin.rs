@@ -269,6 +269,10 @@ fn profiles_come_from_flags_and_files_and_bad_ones_are_named() {
     }
     let (code, _, error) = kinran(&["skin-lut", "-o", str(&out), "--burley", "0.9,0.4"]);
     assert!(code == Some(2) && error.contains("three numbers"), "{error}");
+    for size in ["0x0", "1x64", "64x8192", "wide"] {
+        let (code, _, error) = kinran(&["skin-lut", "-o", str(&out), "--size", size]);
+        assert!(code == Some(2) && error.contains("each 2 to 4096"), "{size}: {error}");
+    }
 }
 
 #[test]

@@ -66,11 +66,15 @@ pub enum PhaseName {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum FuzzLanguage {
     /// WebGPU
+    #[value(alias = "wesl")]
     Wgsl,
     /// Direct3D
     Hlsl,
-    /// OpenGL and Vulkan
+    /// OpenGL, Vulkan and WebGL
+    #[value(aliases = ["glsl-450", "glsl-es-300"])]
     Glsl,
+    /// Metal
+    Msl,
 }
 
 /// What was fitted.
@@ -109,12 +113,14 @@ pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
     let tabulated = match &args.table {
         Some(path) => {
             let tabulated = ambient_table(phase, tilt, spread);
+            outputs::make_place(path)?;
             write_exr(path, &table_image(&tabulated)?)?;
             Some(tabulated.ratio)
         }
         None => None,
     };
     if let Some(path) = &args.plots {
+        outputs::make_place(path)?;
         write_atomically(path, phase_plots(&fit).as_bytes())?;
     }
     drop(busy);
@@ -223,6 +229,7 @@ fn constants(fit: &FuzzFit, warning: Option<&str>, language: FuzzLanguage) -> St
         FuzzLanguage::Wgsl => format!("const {name}: f32 = {value:?};\n"),
         FuzzLanguage::Hlsl => format!("static const float {name} = {value:?};\n"),
         FuzzLanguage::Glsl => format!("const float {name} = {value:?};\n"),
+        FuzzLanguage::Msl => format!("constant float {name} = {value:?};\n"),
     };
     text += &scalar("FUZZ_ALPHA", fit.alpha);
     text += &scalar("FUZZ_K", fit.k);
@@ -246,6 +253,7 @@ fn constants(fit: &FuzzFit, warning: Option<&str>, language: FuzzLanguage) -> St
             FuzzLanguage::Wgsl => format!("const {name} = array<f32, {n}>({list});\n"),
             FuzzLanguage::Hlsl => format!("static const float {name}[{n}] = {{ {list} }};\n"),
             FuzzLanguage::Glsl => format!("const float {name}[{n}] = float[{n}]({list});\n"),
+            FuzzLanguage::Msl => format!("constant float {name}[{n}] = {{ {list} }};\n"),
         };
     }
     text

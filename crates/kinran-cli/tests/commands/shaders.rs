@@ -72,6 +72,22 @@ fn a_module_brings_what_it_needs_and_nothing_else() {
     assert!(at("float sym2_det(") < at("float ggx_matrix_d("));
     assert!(!said.out.contains("aniso_decode("), "{}", said.out);
 
+    // A group's name is that of all its modules.
+    let out = folder.path().join("fuzz");
+    let said = kinran(&["shaders", "--lang", "wgsl", "--module", "fuzz", "-o", text(&out)]);
+    assert_eq!(said.code, Some(0), "{}", said.err);
+    let of_fuzz: Vec<String> =
+        MODULES.iter().filter(|name| name.starts_with("fuzz_")).map(|name| format!("{name}.wgsl")).collect();
+    let written = files(&out);
+    assert!(of_fuzz.len() > 3 && of_fuzz.iter().all(|name| written.contains(name)), "{written:?}");
+    assert!(
+        !written.iter().any(|name| name.starts_with("skin") || name.starts_with("detail")),
+        "{written:?}"
+    );
+    let said = kinran(&["shaders", "--lang", "glsl-450", "--module", "skin"]);
+    assert!(said.code == Some(0) && said.out.contains("curvature_decode("), "{}", said.err);
+    refused(&["shaders", "--lang", "wesl", "--module", "fuzz"], &["several modules", "--output"]);
+
     // WESL has imports for what it needs.
     let said = kinran(&["shaders", "--lang", "wesl", "--module", "ggx"]);
     assert!(said.out.contains("import package::sym") && !said.out.contains("fn sym2_det"), "{}", said.out);
