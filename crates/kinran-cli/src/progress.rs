@@ -56,7 +56,17 @@ struct Work {
     /// 0 while nobody knows.
     total: AtomicU64,
     done: AtomicU64,
+    pace: Mutex<Pace>,
     bar: Mutex<Option<ProgressBar>>,
+}
+
+/// When more was last seen to be done, how much, and by which step.
+#[derive(Clone, Copy, Default)]
+struct Pace {
+    /// Since the work began.
+    after: Duration,
+    done: u64,
+    step: u64,
 }
 
 /// All that is being done, drawn from a thread of its own: what takes long before its first tick shows too.
@@ -138,6 +148,7 @@ impl Progress {
             started: Instant::now(),
             total: total.into(),
             done: 0.into(),
+            pace: Mutex::default(),
             bar: Mutex::default(),
         };
         let work = Arc::new(work);
@@ -241,13 +252,31 @@ impl Work {
         (total > 0).then(|| (done as f32 / total as f32).min(1.0))
     }
 
-    /// The time that is left if the rest goes as what is done did; else the time that it has taken.
+    /// The time that is left if the rest goes as what is done did, where that can be told; else the time that it has taken.
     fn time(&self) -> String {
-        let taken = self.started.elapsed().as_secs_f32();
-        match self.share() {
-            Some(share) if share > 0.0 => format!("{} left", duration(taken * (1.0 - share) / share)),
+        let taken = self.started.elapsed();
+        match self.left(taken) {
+            Some(left) if left.as_secs_f32() >= 0.5 => format!("{} left", duration(left)),
             _ => duration(taken),
         }
+    }
+
+    /// The time that is left. It passes between two units, however long the one takes that is being done, down to what those
+    /// take that come after it.
+    fn left(&self, taken: Duration) -> Option<Duration> {
+        let [done, total] = [&self.done, &self.total].map(|count| count.load(Ordering::Relaxed));
+        let mut pace = lock(&self.pace);
+        if done != pace.done {
+            *pace = Pace { after: taken, done, step: done - pace.done };
+        }
+        if pace.done == 0 || total == 0 {
+            return None;
+        }
+        let of_units = |units: u64| pace.after.mul_f64(units as f64 / pace.done as f64);
+        let rest = total.saturating_sub(done);
+        Some(
+            (pace.after + of_units(rest)).saturating_sub(taken).max(of_units(rest.saturating_sub(pace.step))),
+        )
     }
 
     fn line(&self) -> String {
@@ -257,16 +286,12 @@ impl Work {
         }
     }
 
-    fn draw(&self, bars: &MultiProgress) {
+    fn draw(&self, bars: &MultiProgress, columns: usize) {
         let mut bar = lock(&self.bar);
         let total = self.total.load(Ordering::Relaxed);
-        let bar = bar.get_or_insert_with(|| {
-            bars.add(ProgressBar::new(0).with_style(style(false)).with_message(self.name.clone()))
-        });
-        if bar.length() != Some(total) {
-            bar.set_style(style(true));
-            bar.set_length(total);
-        }
+        let bar = bar.get_or_insert_with(|| bars.add(ProgressBar::new(0).with_message(self.name.clone())));
+        bar.set_style(style(total > 0, self.name.chars().count(), columns));
+        bar.set_length(total);
         bar.set_prefix(self.time());
         bar.set_position(self.done.load(Ordering::Relaxed));
         bar.tick();
@@ -283,7 +308,9 @@ impl Board {
         }
         let shown: Vec<_> = running.works.iter().filter(|work| work.started.elapsed() > 2 * FRAME).collect();
         let Some(last_line) = &self.last_line else {
-            shown.iter().for_each(|work| work.draw(&self.bars));
+            // One column is left, for a terminal that wraps what ends at its edge.
+            let columns = usize::from(console::Term::stderr().size().1).saturating_sub(1);
+            shown.iter().for_each(|work| work.draw(&self.bars, columns));
             return true;
         };
         let mut last_line = lock(last_line);
@@ -296,12 +323,25 @@ impl Board {
     }
 }
 
-fn style(has_share: bool) -> ProgressStyle {
+/// Columns of a name, of a bar, and of the shortest bar that is drawn; chosen by eye.
+const NAME: usize = 28;
+const BAR: usize = 40;
+const SHORTEST: usize = 10;
+
+/// Columns behind a bar: a share and "100 min left".
+const BEHIND: usize = " 100 %  ".len() + "100 min left".len();
+
+/// A bar's line: on a terminal too narrow for name, bar and time it goes without the bar, then with part of the name.
+fn style(has_share: bool, name: usize, columns: usize) -> ProgressStyle {
+    let bar = columns.saturating_sub(name.max(NAME) + " ".len() + BEHIND).min(BAR);
     let template = match has_share {
-        false => "{msg:28} {spinner} {prefix}",
-        true => "{msg:28} {bar:40} {percent:>3} %  {prefix}",
+        true if bar >= SHORTEST => format!("{{msg:{NAME}}} {{bar:{bar}}} {{percent:>3}} %  {{prefix}}"),
+        true if columns >= BEHIND => "{wide_msg} {percent:>3} %  {prefix}".into(),
+        false if columns >= name.max(NAME) + BEHIND => format!("{{msg:{NAME}}} {{spinner}} {{prefix}}"),
+        false if columns >= BEHIND => "{wide_msg} {spinner} {prefix}".into(),
+        _ => "{wide_msg}".into(),
     };
-    ProgressStyle::with_template(template).expect("the template is well formed")
+    ProgressStyle::with_template(&template).expect("the template is well formed")
 }
 
 /// Draws as long as anything is done.
@@ -320,9 +360,9 @@ fn line(works: &[String]) -> String {
     works[..works.len().min(NAMED)].join("; ") + &more
 }
 
-/// Seconds as people say them.
-fn duration(seconds: f32) -> String {
-    match seconds.round() as u64 {
+/// Time as people say it.
+fn duration(time: Duration) -> String {
+    match time.as_secs_f64().round() as u64 {
         seconds @ 0..100 => format!("{seconds} s"),
         seconds @ 100..6000 => format!("{} min", (seconds + 30) / 60),
         seconds => format!("{} h", (seconds + 1800) / 3600),
@@ -335,6 +375,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 #[cfg(test)]
 mod tests {
+    use indicatif::{ProgressDrawTarget, TermLike};
+
     use super::*;
 
     fn work(total: u64, done: u64) -> Work {
@@ -343,6 +385,7 @@ mod tests {
             started: Instant::now() - Duration::from_secs(8),
             total: total.into(),
             done: done.into(),
+            pace: Mutex::default(),
             bar: Mutex::default(),
         }
     }
@@ -412,9 +455,79 @@ mod tests {
         assert_eq!(work(10, 0).line(), "baking lamp: 0 %, 8 s");
         assert_eq!(work(0, 0).line(), "baking lamp: 8 s");
         // Whoever counts more than was announced is done.
-        assert_eq!(work(10, 20).line(), "baking lamp: 100 %, 0 s left");
-        let of = |seconds| duration(seconds);
+        assert_eq!(work(10, 20).line(), "baking lamp: 100 %, 8 s");
+        let of = |seconds| duration(Duration::from_secs_f64(seconds));
         assert_eq!([of(99.4), of(100.0), of(5999.0), of(6000.0)], ["99 s", "2 min", "100 min", "2 h"]);
+    }
+
+    #[test]
+    fn what_is_left_grows_while_a_unit_takes_long() {
+        let left = |work: &Work, taken| work.left(Duration::from_secs(taken)).map(|left| left.as_secs());
+        let uneven = work(10, 0);
+        assert_eq!(left(&uneven, 9), None);
+        // Four units in eight seconds; then one that takes as long as eight others.
+        uneven.done.store(4, Ordering::Relaxed);
+        let told: Vec<_> = [8, 9, 10, 11, 16, 24].map(|taken| left(&uneven, taken)).into();
+        assert_eq!(told, [12, 11, 10, 9, 4, 4].map(Some), "what is behind a step of four units takes 4 s");
+        uneven.done.store(5, Ordering::Relaxed);
+        assert_eq!([24, 28, 40, 60].map(|taken| left(&uneven, taken)), [24, 20, 19, 19].map(Some));
+        // The last one: nobody knows.
+        uneven.done.store(9, Ordering::Relaxed);
+        assert_eq!([54, 90].map(|taken| left(&uneven, taken)), [6, 0].map(Some));
+    }
+
+    /// A terminal that keeps the widest line written to it.
+    #[derive(Debug)]
+    struct Narrow(u16, Arc<AtomicU64>);
+
+    impl TermLike for Narrow {
+        fn width(&self) -> u16 {
+            self.0
+        }
+        fn move_cursor_up(&self, _: usize) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_down(&self, _: usize) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_right(&self, _: usize) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_left(&self, _: usize) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn write_line(&self, line: &str) -> std::io::Result<()> {
+            self.write_str(line)
+        }
+        fn write_str(&self, text: &str) -> std::io::Result<()> {
+            let plain = console::strip_ansi_codes(text);
+            let width = plain.lines().map(console::measure_text_width).max().unwrap_or(0);
+            self.1.fetch_max(width as u64, Ordering::Relaxed);
+            Ok(())
+        }
+        fn clear_line(&self) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn flush(&self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn bars_wrap_on_narrow_terminals() {
+        for columns in [8, 19, 20, 30, 39, 48, 60, 61, 80, 100, 200] {
+            for (name, total) in [("lamp", 10), ("lamp", 0), (&*"a long name ".repeat(6), 10), ("x", 1 << 40)]
+            {
+                let widest = Arc::new(AtomicU64::new(0));
+                let term = Narrow(columns, widest.clone());
+                let target = ProgressDrawTarget::term_like(Box::new(term));
+                let bars = MultiProgress::with_draw_target(target);
+                let work = Work { name: name.into(), ..work(total, total / 7) };
+                work.draw(&bars, usize::from(columns) - 1);
+                let widest = widest.load(Ordering::Relaxed);
+                assert!(widest > 0 && widest <= columns.into(), "{name}: {widest} of {columns} columns");
+            }
+        }
     }
 
     #[test]
