@@ -404,6 +404,9 @@ fn a_report_covers_a_folder_of_materials() {
         std::fs::create_dir_all(&path).unwrap();
         write_png(&path.join(format!("{material}_color.png")), &scan(32, seed)).unwrap();
     }
+    // What is called as no map is told of.
+    std::fs::create_dir_all(folder.path("materials/misc")).unwrap();
+    write_png(&folder.path("materials/misc/photo.png"), &scan(32, 7)).unwrap();
     let report = kinran_json(&[
         "detail",
         "report",
@@ -418,6 +421,8 @@ fn a_report_covers_a_folder_of_materials() {
     let rows = report["rows"].as_array().unwrap();
     let of = |against: &str| rows.iter().filter(|row| row["against"] == against).count();
     assert_eq!((of("own"), of("other"), of("faded")), (3, 3, 3));
+    let warnings = report["warnings"].as_array().unwrap();
+    assert!(warnings.len() == 1 && warnings[0].as_str().unwrap().ends_with(": misc"), "{warnings:?}");
     // Two mips of three ways.
     assert_eq!(report["means"].as_array().unwrap().len(), 6);
     let faded = report["means"].as_array().unwrap().iter().filter(|mean| mean["against"] == "faded");

@@ -122,7 +122,7 @@ pub struct EntryReport {
 pub struct LibraryReport {
     /// Where the files are.
     pub output: PathBuf,
-    /// Nothing was baked or removed.
+    /// Nothing was baked or removed, and no texel read.
     pub dry_run: bool,
     /// The entries, in the manifest's order.
     pub entries: Vec<EntryReport>,
@@ -177,6 +177,7 @@ impl LibraryReport {
         text += &format!("{}; in {}\n", counts.join(", "), self.output.display());
         if self.entries.iter().any(planned) {
             text += &format!("the files will take {}\n", space_text(self.space));
+            text += "no texel was read: what maps say against their names is told when they are baked\n";
         }
         let named = |folders: &[PathBuf]| {
             let names: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
@@ -316,7 +317,9 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
             },
         }
     }
-    let space = library.space(&todo);
+    let (spaces, units): (Vec<Space>, Vec<u64>) = library.plan(&todo).into_iter().unzip();
+    let mut space = Space::default();
+    spaces.into_iter().for_each(|of_entry| space.add(of_entry));
     if args.dry_run {
         for (at, key, ..) in &todo {
             let cached = library.cache.as_ref().is_some_and(|cache| cache.get(key).is_some());
@@ -338,21 +341,23 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
     // Bake the rest, some at a time. Threads of their own and not tasks of the pool: a thread of the pool that
     // waits for a part of one entry would begin another one meanwhile, and hold both in memory.
     let bars = console.progress();
-    let stage = bars.stage("baking", todo.len() as u64);
+    let stage = bars.stage("baking", units.iter().sum());
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<(usize, EntryReport, Key)>> = Mutex::new(Vec::new());
     let threads = args.library.jobs.map_or_else(rayon::current_num_threads, usize::from).min(todo.len());
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
-                while let Some((at, key, job, flags)) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
+                loop {
+                    let turn = next.fetch_add(1, Ordering::Relaxed);
+                    let Some((at, key, job, flags)) = todo.get(turn) else { break };
                     let (mut entry, mut key) = (EntryReport::new(job), *key);
                     match library.make(job, &mut key, flags, &bars, &mut entry) {
                         Ok(status) => entry.status = status,
                         Err(error) => entry.fail(failure(job, &error)),
                     }
                     lock(&done).push((*at, entry, key));
-                    stage.add(1);
+                    stage.add(units[turn]);
                 }
             });
         }
@@ -545,12 +550,14 @@ impl Library {
         }
     }
 
-    /// Bytes that the files of entries will take beyond those that they replace; of an entry that cannot be read nothing,
-    /// since its error is told when its turn comes.
-    fn space(&self, todo: &[(usize, Key, Job, Flags)]) -> Space {
+    /// Of each entry the bytes that its files will take beyond those that they replace, and its share of the work: what it
+    /// writes, and next to nothing where that is kept. Of an entry that cannot be read nothing, since its error is told when
+    /// its turn comes.
+    fn plan(&self, todo: &[(usize, Key, Job, Flags)]) -> Vec<(Space, u64)> {
         let of_entry = |(_, key, job, flags): &(usize, Key, Job, Flags)| {
             let cached = self.cache.as_ref().and_then(|cache| cache.get(key));
             let input = || job.input.clone();
+            let kept = cached.is_some();
             let needed = match (cached, flags) {
                 (Some(entry), _) => Space::exact(entry.files.iter().map(|file| file.bytes).sum()),
                 (None, Flags::Bake(flags)) => {
@@ -564,11 +571,10 @@ impl Library {
                 (None, Flags::Skin(flags)) => skin_lut::space(flags),
             };
             let standing = lock(&self.standing).get(&job.folder).cloned().unwrap_or_default();
-            needed.beyond(standing.files.iter().map(|(file, _)| file.bytes).sum())
+            let units = if kept { 1 } else { needed.most.max(1) };
+            (needed.beyond(standing.files.iter().map(|(file, _)| file.bytes).sum()), units)
         };
-        let mut all = Space::default();
-        todo.par_iter().map(of_entry).collect::<Vec<_>>().into_iter().for_each(|space| all.add(space));
-        all
+        todo.par_iter().map(of_entry).collect()
     }
 
     /// The files of an entry, if they stand in the output as they were written, and what was doubtful about them.
@@ -677,7 +683,7 @@ impl Library {
                 };
                 refuse_input(job, &path)?;
                 if let Some(parent) = path.parent() {
-                    std::fs::create_dir_all(parent).map_err(|e| kinran_image::Error::io(parent, e))?;
+                    kinran_image::make_folder(parent)?;
                 }
                 match (&source, bytes) {
                     (Source::Work(work), _) => move_file(&work.join(&name), &path)?,
@@ -757,7 +763,7 @@ impl Library {
     /// Saves what is known of inputs and output, so that the next run need not look at their bytes.
     fn save(&self) -> Result<(), Error> {
         let state = self.state();
-        std::fs::create_dir_all(&state).map_err(|e| kinran_image::Error::io(&state, e))?;
+        kinran_image::make_folder(&state)?;
         *lock(&self.saved) = Instant::now();
         self.stamps.save(&state.join("inputs.json"))?;
         if self.is_news.swap(false, Ordering::Relaxed) {

@@ -25,7 +25,7 @@ use serde::Serialize;
 use super::{BlockFormat, KindName, page};
 use crate::outputs::{check_folder, named_after, refuse_other_page, tell_place};
 use crate::table::table;
-use crate::values::{exr_layer, exr_layer_of};
+use crate::values::{exr_layer, exr_layer_of, list};
 use crate::{Console, Error};
 
 /// Paints a target over every material of a folder, solves each and reports the errors: report.json and index.html
@@ -203,6 +203,8 @@ pub struct LibraryReport {
     pub means: Vec<LibraryMean>,
     /// Every target.
     pub rows: Vec<LibraryRow>,
+    /// What was left out, a sentence each.
+    pub warnings: Vec<String>,
 }
 
 pub(super) fn run(args: &LibraryArgs, console: &Console) -> Result<(), Error> {
@@ -210,6 +212,7 @@ pub(super) fn run(args: &LibraryArgs, console: &Console) -> Result<(), Error> {
     check_folder(&output)?;
     refuse_other_page(&output.join("index.html"))?;
     let report = report_library(args, console)?;
+    report.warnings.iter().for_each(|warning| console.warn(warning));
     let pages = ["index.html", "report.json"].map(|file| output.join(file).display().to_string());
     console.result(&report, &format!("{}wrote {}\n", text(&report), pages.join(", ")))?;
     tell_place(console, args.output.as_deref(), &output);
@@ -221,17 +224,17 @@ pub(super) fn run(args: &LibraryArgs, console: &Console) -> Result<(), Error> {
 /// # Errors
 /// The folder has no materials with maps of the kinds asked for, a map cannot be read, or the output cannot be written.
 pub fn report_library(args: &LibraryArgs, console: &Console) -> Result<LibraryReport, Error> {
-    let materials = read_materials(args, console)?;
+    let (materials, warnings) = read_materials(args, console)?;
     let formats =
         if args.format.is_empty() { vec![BlockFormat::Bc1, BlockFormat::Bc7] } else { args.format.clone() };
     let output = args.output();
     let pictures = output.join("pictures");
     let folder = if args.no_pictures { &output } else { &pictures };
-    std::fs::create_dir_all(folder).map_err(|e| kinran_image::Error::io(folder, e))?;
+    kinran_image::make_folder(folder)?;
     let of_map = |map: &MapFile| formats_of(map, &formats).len() as u64 * texels(args, map);
     let targets = materials.iter().flat_map(|m| m.maps.iter().filter(|map| map.is_target(args)));
     let stage = console.progress().stage("painting and solving", targets.map(of_map).sum());
-    let mut report = LibraryReport { size: args.size, means: Vec::new(), rows: Vec::new() };
+    let mut report = LibraryReport { size: args.size, means: Vec::new(), rows: Vec::new(), warnings };
     for (i, material) in materials.iter().enumerate() {
         for map in material.maps.iter().filter(|map| map.is_target(args)) {
             for (n, format) in formats_of(map, &formats).iter().enumerate() {
@@ -448,8 +451,9 @@ fn crop(image: &Image, side: u32) -> Result<Image, Error> {
     Ok(Image::new(w, h, image.channels, Pixels::U8(rows.collect()))?)
 }
 
-/// The materials of a folder that have a map to paint over, in the order of their names.
-fn read_materials(args: &LibraryArgs, console: &Console) -> Result<Vec<Material>, Error> {
+/// The materials of a folder that have a map to paint over, in the order of their names, and a sentence on folders that have
+/// none.
+fn read_materials(args: &LibraryArgs, console: &Console) -> Result<(Vec<Material>, Vec<String>), Error> {
     let io = |e| kinran_image::Error::io(&args.folder, e);
     let mut folders: Vec<PathBuf> = std::fs::read_dir(&args.folder)
         .map_err(io)?
@@ -458,18 +462,18 @@ fn read_materials(args: &LibraryArgs, console: &Console) -> Result<Vec<Material>
     folders.retain(|folder| folder.is_dir());
     folders.sort();
     let stage = console.progress().stage("reading maps", folders.len() as u64);
-    let materials: Vec<Option<Material>> = folders
+    let materials: Vec<Material> = folders
         .par_iter()
         .map(|folder| {
             let maps = read_maps(folder, args);
             stage.add(1);
-            let maps = maps?;
             let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            Ok(maps.iter().any(|map| map.is_target(args)).then_some(Material { name, maps }))
+            Ok(Material { name, maps: maps? })
         })
         .collect::<Result<_, Error>>()?;
     drop(stage);
-    let materials: Vec<Material> = materials.into_iter().flatten().collect();
+    let (materials, others): (Vec<_>, Vec<_>) =
+        materials.into_iter().partition(|material| material.maps.iter().any(|map| map.is_target(args)));
     if materials.is_empty() {
         return Err(Error::file_error(
             &args.folder,
@@ -477,7 +481,11 @@ fn read_materials(args: &LibraryArgs, console: &Console) -> Result<Vec<Material>
              ao or metallic",
         ));
     }
-    Ok(materials)
+    let left_out = (!others.is_empty()).then(|| {
+        let names: Vec<String> = others.into_iter().map(|material| material.name).collect();
+        format!("left out, for no map in them is named as one that is asked for: {}", list(&names))
+    });
+    Ok((materials, left_out.into_iter().collect()))
 }
 
 /// The maps of a material that are painted over or painted by.
