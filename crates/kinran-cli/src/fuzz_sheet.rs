@@ -10,7 +10,7 @@ use kinran_bake::aniso::Filter;
 use kinran_image::{Channels, Image, Pixels, Transfer};
 use kinran_render::metrics::flip;
 use kinran_render::reference::{
-    BoundTexture, MipTexture, RenderFuzz, RenderScene, Surroundings, TextureFiltering,
+    Background, BoundTexture, MipTexture, RenderFuzz, RenderScene, Surroundings, TextureFiltering,
 };
 use kinran_scene::{Environment, Fuzz, FuzzAttenuation, FuzzLayer, Light, LightKind, Wrap};
 use kinran_shading::fuzz::{FUZZ_DEFERRED_ALBEDO, fibre_direction};
@@ -25,7 +25,7 @@ use crate::picture::{Picture, Row, grid};
 use crate::surfaces::{Mips, fuzz_fits, scene_surfaces};
 use crate::values::{counted, number, vector};
 use crate::view::{EnvironmentChoice, View, ViewArgs, file_name, samples_of};
-use crate::{Console, Error, Progress, outputs};
+use crate::{Console, Error, Progress, outputs, sheet_flags};
 
 /// Draws a model with fuzz, a sheet of pictures for each parameter
 ///
@@ -71,7 +71,7 @@ pub struct Args {
     pub tilt: f32,
 
     /// Linear albedo of the fibres, each 0 to 1
-    #[arg(long, value_name = "R,G,B", default_value = "0.95,0.35,0.42", value_parser = vector)]
+    #[arg(long, value_name = "R,G,B", default_value = COLOR, value_parser = vector)]
     pub color: Vec3,
 
     /// Linear colour of the base under the fibres: velvet shows on a dark one. `own` leaves colour and roughness as the file
@@ -101,6 +101,46 @@ pub struct Args {
 }
 
 impl Args {
+    /// Flags that some sheets have no use for.
+    fn given(&self) -> Vec<&'static str> {
+        let own = [
+            ("density", self.density != 0.2),
+            ("spread", self.spread != 0.2),
+            ("tilt", self.tilt != 23.0),
+            ("color", COLOR.parse().is_ok_and(|color: Base| color != Base::Color(self.color))),
+            ("roughness", self.roughness.is_some()),
+            ("direction", self.direction != Direction::Even),
+            ("backend", self.backend != Backend::Cpu),
+        ];
+        let own = own.into_iter().filter(|(_, given)| *given).map(|(name, _)| name);
+        own.chain(sheet_flags::given(&self.view)).collect()
+    }
+
+    /// Whether a flag of [`Args::given`] shows on a sheet; `plain` where parameters are seen in lights of their own.
+    fn obeys(&self, flag: &str, sheet: Sheet, plain: bool) -> bool {
+        let surrounded = matches!(sheet, Sheet::Light | Sheet::Probe | Sheet::Realtime) || !plain;
+        match (flag, sheet) {
+            ("density", Sheet::Density) | ("spread", Sheet::Spread) | ("tilt", Sheet::Tilt) => false,
+            ("density" | "spread" | "tilt" | "direction", Sheet::Simple) => false,
+            ("color", Sheet::Simple) => self.is_on_dark(),
+            ("roughness" | "light" | "shadows" | "no-shadows", Sheet::Probe) | ("light", Sheet::Light) => {
+                false
+            }
+            ("env", Sheet::Probe) => self.view.environment() != EnvironmentChoice::None,
+            ("backend", Sheet::Realtime) => false,
+            ("env-rotation" | "env-samples", _) => surrounded,
+            ("background", _) if matches!(self.view.background, Some(Background::Environment { .. })) => {
+                surrounded
+            }
+            _ => true,
+        }
+    }
+
+    /// Whether the base is the default one.
+    fn is_on_dark(&self) -> bool {
+        DARK.parse().is_ok_and(|dark: Base| dark == self.base)
+    }
+
     /// Whether any sheet is drawn on a GPU.
     pub(crate) fn draws_on_a_gpu(&self) -> bool {
         self.backend == Backend::Gpu || self.sheet.contains(&Sheet::Realtime)
@@ -154,6 +194,9 @@ pub enum Direction {
     Swirl,
 }
 
+/// The default colour of the fibres; chosen by eye.
+const COLOR: &str = "0.95,0.35,0.42";
+
 /// The default colour of the base; chosen by eye.
 const DARK: &str = "0.03,0.006,0.01";
 
@@ -197,8 +240,13 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             return Err(Error::flag_error(format!("{flag} {x},{y},{z}"), "each must lie in 0 to 1"));
         }
     }
-    let sheets = match args.sheet.as_slice() {
-        [] => Sheet::value_variants().iter().copied().filter(|&s| s != Sheet::Realtime).collect(),
+    // A probe of nothing is black.
+    let is_shown = |sheet: &Sheet| {
+        let surrounded = args.view.environment() != EnvironmentChoice::None;
+        *sheet != Sheet::Realtime && (surrounded || *sheet != Sheet::Probe)
+    };
+    let sheets: Vec<Sheet> = match args.sheet.as_slice() {
+        [] => Sheet::value_variants().iter().copied().filter(is_shown).collect(),
         named => named.to_vec(),
     };
     let pictures = sheets.iter().map(|&sheet| output.join(sheet_file(sheet)));
@@ -220,6 +268,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             material.metallic_roughness = None;
         }
     }
+    let plain = args.view.light.is_empty() && scene.lights.is_empty() && args.view.env.is_none();
+    sheet_flags::refuse_idle(&args.given(), &sheets, |flag, sheet| args.obeys(flag, sheet, plain))?;
+    args.view.refuse_idle(&scene, &path.to_string_lossy())?;
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
     let mips = if only_baked { Mips::Baked } else { Mips::Filtered(Filter::Linear) };
     let (surfaces, apart) = scene_surfaces(&scene, mips, &progress)?;
@@ -229,9 +280,6 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let bare = (args.density == 0.0).then(|| "--density 0: there are no fibres to see".to_owned());
     let warnings: Vec<String> = told.chain(apart).chain(left_out).chain(bare).collect();
     warnings.iter().for_each(|w| console.warn(w));
-    let plain = args.view.light.is_empty()
-        && scene.lights.is_empty()
-        && matches!(args.view.env, EnvironmentChoice::Studio);
     let parameters = if plain {
         let lights = LIGHTS.map(|direction| light(&view, direction, BRIGHTNESS));
         View { lights: lights.into(), environment: None, ..view.clone() }
@@ -244,7 +292,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let pictures: usize = sheets.iter().map(|&sheet| studio.count(sheet)).sum();
     all.expect(pictures as u64 * samples_of(args.view.size, args.spp));
 
-    std::fs::create_dir_all(&output).map_err(|e| kinran_image::Error::io(&output, e))?;
+    kinran_image::make_folder(&output)?;
     let mut text = String::new();
     let (mut files, mut flip) = (Vec::new(), Vec::new());
     for sheet in sheets {
@@ -373,8 +421,7 @@ impl Studio<'_> {
             Sheet::Simple => {
                 let simple = |fuzziness| Some(Fuzz::Simple { fuzziness, texture: None });
                 // Fibres of this form have their colour from the base: they get the one that --color says.
-                let is_dark = DARK.parse().is_ok_and(|dark: Base| dark == self.args.base);
-                let base = is_dark.then(|| self.args.color / FUZZ_DEFERRED_ALBEDO);
+                let base = self.args.is_on_dark().then(|| self.args.color / FUZZ_DEFERRED_ALBEDO);
                 let shot = |f| Shot { base, ..self.shot(format!("fuzziness {f}"), simple(f)) };
                 [0.0, 0.5, 1.0].into_iter().map(shot).collect()
             }

@@ -27,6 +27,7 @@ mod ranking;
 pub mod render;
 mod schema;
 pub mod shaders;
+mod sheet_flags;
 pub mod skin;
 pub mod skin_lut;
 pub mod skin_sheet;

@@ -43,7 +43,7 @@ const GAP: u32 = 10;
 const LETTERS_IN_A_SHEET: f32 = 70.0;
 const LOWEST_LETTER: f32 = 15.0;
 
-/// Rows of pictures on one sheet, all pictures of the same size.
+/// Rows of pictures on one sheet, all pictures of the same size; a row without any is its name alone.
 pub(crate) fn grid(rows: &[Row]) -> Picture {
     let cells = || rows.iter().flat_map(|row| &row.cells);
     let Some((_, first)) = cells().next() else { return Picture::new(0, 0, PAPER) };
@@ -62,7 +62,8 @@ pub(crate) fn grid(rows: &[Row]) -> Picture {
     };
     let height_of = |row: &Row| {
         let (name, labelled) = lines(row);
-        (name.len() as u32 + u32::from(labelled)) * line + first.height + GAP
+        let pictures = if row.cells.is_empty() { 0 } else { first.height };
+        (name.len() as u32 + u32::from(labelled)) * line + pictures + GAP
     };
     let mut sheet = Picture::new(sheet_width, rows.iter().map(height_of).sum(), PAPER);
     let mut top = 0;

@@ -115,6 +115,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let progress = console.progress();
     let painter = args.backend.open(args.shaders.as_deref(), &progress)?;
     let Model { path, scene, only_baked } = Model::open(&args.file, &args.view.model, &progress)?;
+    args.view.refuse_idle(&scene, &path.to_string_lossy())?;
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
     let own = if only_baked { Mips::Baked } else { Mips::of(&scene) };
     let mips = args.filter.unwrap_or(own);
@@ -142,6 +143,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     painter.left_out(&view, &prepared).iter().for_each(|what| console.warn(what));
     let film = painter.film(&view, &prepared, "render", args.spp, filtering, &progress)?;
     if outputs::has_extension(&output, "exr") {
+        outputs::make_place(&output)?;
         let pixels = Pixels::F32(film.pixels.into_flattened());
         write_exr(&output, &Image::new(film.width, film.height, Channels::Rgb, pixels)?)?;
     } else {
@@ -176,8 +178,9 @@ pub(crate) fn triangles(scene: &Scene) -> usize {
     scene.instances.iter().map(|i| scene.primitives[i.primitive].triangles.len()).sum()
 }
 
-/// Writes an 8-bit PNG.
+/// Writes an 8-bit PNG, into a folder that need not be there.
 pub(crate) fn write_rgb8(path: &Path, width: u32, height: u32, pixels: Vec<[u8; 3]>) -> Result<(), Error> {
+    outputs::make_place(path)?;
     let pixels = Pixels::U8(pixels.into_flattened());
     Ok(write_png(path, &Image::new(width, height, Channels::Rgb, pixels)?)?)
 }

@@ -30,8 +30,8 @@ use crate::skin::{SIZE, profile, skin_table};
 use crate::skin_lut::plot::plot;
 use crate::surfaces::{Mips, scene_surfaces};
 use crate::values::{choice, counted, number, vector};
-use crate::view::{View, ViewArgs, file_name, samples_of};
-use crate::{Console, Error, Progress, outputs};
+use crate::view::{EnvironmentChoice, View, ViewArgs, file_name, samples_of};
+use crate::{Console, Error, Progress, outputs, sheet_flags};
 
 /// Draws a model as skin, a sheet of pictures for each choice
 ///
@@ -43,7 +43,8 @@ use crate::{Console, Error, Progress, outputs};
 ///
 /// Pictures show the part of the model where curvature depends most on direction, such as a face or fingers; --whole,
 /// --crop, --camera or --distance show another one. Every material is taken for skin unless the file marks some, and has the
-/// colour of skin where the file gives none. Curvature is that of the file, or baked in memory where it has none, of smooth
+/// colour of skin where the file gives none. Each sheet has its own lights; those of --light take the place of one that stands
+/// still, and --env adds light from all around. Curvature is that of the file, or baked in memory where it has none, of smooth
 /// normals where it has none of those either.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -95,6 +96,29 @@ pub struct Args {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub view: ViewArgs,
+}
+
+impl Args {
+    /// Flags that some sheets have no use for.
+    fn given(&self) -> Vec<&'static str> {
+        let own = [("base", self.base.is_some()), ("spp", self.spp != 16)];
+        let own = own.into_iter().filter(|(_, given)| *given).map(|(name, _)| name);
+        own.chain(sheet_flags::given(&self.view)).collect()
+    }
+
+    /// Whether a flag of [`Args::given`] shows on a sheet.
+    fn obeys(&self, flag: &str, sheet: Sheet) -> bool {
+        match (flag, sheet) {
+            // It is drawn in grey, without light.
+            (_, Sheet::Tensors) => false,
+            ("light", Sheet::Turn | Sheet::Profiles)
+            | ("no-shadows", Sheet::Turn | Sheet::Shadows)
+            | ("skin-curvature", Sheet::Turn)
+            | ("skin-normals", Sheet::Normals) => false,
+            ("skin-penumbra", Sheet::Turn) => self.view.shadows,
+            _ => true,
+        }
+    }
 }
 
 fn part(text: &str) -> Result<[f32; 4], String> {
@@ -156,6 +180,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let output = args.output.clone().unwrap_or_else(|| outputs::named_after(&args.file, ".skin"));
     outputs::check_folder(&output)?;
     let sheets = if args.sheet.is_empty() { Sheet::value_variants() } else { &args.sheet };
+    sheet_flags::refuse_idle(&args.given(), sheets, |flag, sheet| args.obeys(flag, sheet))?;
     let pictures = sheets.iter().map(|&sheet| output.join(sheet_file(sheet)));
     args.view.refuse_inputs(&args.file, pictures)?;
     if let Some(c) = args.base.filter(|c| c.min_element() < 0.0 || c.max_element() > 1.0) {
@@ -171,7 +196,11 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     }
     bake(args, &mut scene, &progress, &mut warnings)?;
 
-    let mut view = View::new(&scene, &file.to_string_lossy(), &args.view)?;
+    // Punctual light shows what skin does, and light from all around only where it is asked for.
+    let shown =
+        ViewArgs { env: Some(args.view.env.clone().unwrap_or(EnvironmentChoice::None)), ..args.view.clone() };
+    shown.refuse_idle(&scene, &file.to_string_lossy())?;
+    let mut view = View::new(&scene, &file.to_string_lossy(), &shown)?;
     let (surfaces, apart) = scene_surfaces(&scene, Mips::Filtered(Filter::Linear), &progress)?;
     warnings.extend(view.environment_notes().cloned().chain(apart));
     warnings.iter().for_each(|w| console.warn(w));
@@ -201,7 +230,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let progress = progress.overall(&all);
     let studio = Studio { args, scene: &scene, prepared, view, progress: &progress };
 
-    std::fs::create_dir_all(&output).map_err(|e| kinran_image::Error::io(&output, e))?;
+    kinran_image::make_folder(&output)?;
     let mut files = Vec::new();
     for &sheet in sheets {
         let name = sheet_file(sheet);
@@ -415,8 +444,8 @@ impl Studio<'_> {
     fn turn(&self) -> Result<Picture, Error> {
         let drawn = [SkinCurvature::Zero, SkinCurvature::Mean, SkinCurvature::Directional].map(|curvature| {
             TURN.map(|(_, degrees)| {
-                // Without shadows, which hide where light ends by curvature.
-                let view = View { shadows: false, ..self.view.clone() };
+                // Shadows hide where light ends by curvature.
+                let view = View { shadows: self.args.view.shadows, ..self.view.clone() };
                 let mut scene = self.prepared.clone();
                 scene
                     .materials
@@ -460,8 +489,9 @@ impl Studio<'_> {
         let range = self.prepared.geometry.curvature_range();
         // By the root: most of a body is gently curved.
         let color = |k: f32| false_color((k / range).sqrt());
+        let lit = self.args.view.skin.skin_curvature.to_possible_value().expect("no curvature is hidden");
         let row = vec![
-            ("directional".to_owned(), self.lit("picture", &self.side(), |_| {})?),
+            (lit.get_name().to_owned(), self.lit("picture", &self.side(), |_| {})?),
             ("mean curvature".to_owned(), self.colored(|_, mean| color(mean))),
             ("larger principal".to_owned(), self.colored(|t, _| color(principal(t).0))),
             ("smaller principal".to_owned(), self.colored(|t, _| color(principal(t).1.max(0.0)))),
@@ -533,19 +563,22 @@ impl Studio<'_> {
             rights.push(self.draw("linear", &self.prepared, &light)?);
         }
         let (apart, gain) = enlarged_differences(&wrongs, &rights);
-        let difference = match gain {
-            None => "difference: nothing that shows".to_owned(),
-            Some(gain) => format!("difference, {gain} times enlarged"),
-        };
-        let rows = wrongs.into_iter().zip(rights).zip(apart).map(|((wrong, right), apart)| Row {
-            name: String::new(),
-            cells: vec![
+        let mut apart = apart.into_iter();
+        let rows = wrongs.into_iter().zip(rights).map(|(wrong, right)| {
+            let mut cells = vec![
                 ("radial profile on the ring (wrong)".to_owned(), wrong),
                 ("linear profile (right)".to_owned(), right),
-                (difference.clone(), apart),
-            ],
+            ];
+            if let (Some(apart), Some(gain)) = (apart.next(), gain) {
+                cells.push((format!("difference, {gain} times enlarged"), apart));
+            }
+            Row { name: String::new(), cells }
         });
-        Ok(self.rows(rows.collect()))
+        let mut rows: Vec<Row> = rows.collect();
+        if gain.is_none() {
+            rows.push(Row { name: "their difference: nothing that shows".into(), cells: Vec::new() });
+        }
+        Ok(self.rows(rows))
     }
 
     /// Shadows as rays cast them, filtered, and with light that scatters into them.
@@ -561,7 +594,7 @@ impl Studio<'_> {
                 ..(*skin.tables).clone()
             });
         };
-        let light = self.towards(vec3(-0.6, 0.9, 0.45));
+        let light = self.given_or(vec3(-0.6, 0.9, 0.45));
         Ok(self.row(vec![
             ("hard shadows".into(), self.lit("hard", &light, |skin| skin.penumbra = 0.0)?),
             (format!("filtered over {width} mm"), self.lit("filtered", &light, plain)?),
@@ -613,9 +646,14 @@ impl Studio<'_> {
         self.towards(vec3(a.sin(), 0.25, a.cos()))
     }
 
-    /// The first of the flags' lights, else one from the side.
+    /// The flags' lights, else one from the side.
     fn side(&self) -> Vec<Light> {
         if self.args.view.light.is_empty() { self.around(-80.0) } else { self.view.lights.clone() }
+    }
+
+    /// The flags' lights, else one in the camera's frame: right, up, back.
+    fn given_or(&self, direction: Vec3) -> Vec<Light> {
+        if self.args.view.light.is_empty() { self.towards(direction) } else { self.view.lights.clone() }
     }
 
     /// A light in the camera's frame: right, up, back.
@@ -637,7 +675,7 @@ impl Studio<'_> {
         self.draw(name, &scene, lights)
     }
 
-    /// A picture in the light of `lights` alone.
+    /// A picture in the light of `lights`, and of the environment where there is one.
     fn draw(&self, name: &str, scene: &RenderScene, lights: &[Light]) -> Result<Picture, Error> {
         self.draw_in(&self.view, name, scene, lights)
     }
@@ -651,7 +689,6 @@ impl Studio<'_> {
     ) -> Result<Picture, Error> {
         let mut scene = scene.clone();
         scene.lights = lights.to_vec();
-        scene.surroundings = None;
         let filtering = TextureFiltering::Mips { max_anisotropy: 16 };
         let film = view.render(&scene, name, self.args.spp, filtering, self.progress)?;
         Ok(Picture { width: film.width, height: film.height, pixels: view.display(&film) })
@@ -733,7 +770,7 @@ impl Studio<'_> {
 }
 
 /// Differences of pictures in false colour, the largest of each pixel's channels, all enlarged so many times: by the power of
-/// two at which the largest ones but a few are not yet white. `None` and black where they are but noise and rounding.
+/// two at which the largest ones but a few are not yet white. `None`, and no pictures, where they are but noise and rounding.
 fn enlarged_differences(a: &[Picture], b: &[Picture]) -> (Vec<Picture>, Option<u32>) {
     let largest = |a: &Color, b: &Color| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
     let apart = |a: &Picture, b: &Picture| -> Vec<u8> {
@@ -747,14 +784,16 @@ fn enlarged_differences(a: &[Picture], b: &[Picture]) -> (Vec<Picture>, Option<u
     let gain = [1, 2, 4, 8, 16, 32].into_iter().rev().find(|gain| gain * most <= 255).unwrap_or(1);
     let all: usize = apart.iter().map(Vec::len).sum();
     let shows = seen.iter().filter(|&&c| u32::from(c) >= SEEN).count() as f32 >= SEEN_SHARE * all as f32;
-    let gain = shows.then_some(gain);
-    let color = |c: u8| false_color((u32::from(c) * gain.unwrap_or(0)) as f32 / 255.0);
+    if !shows {
+        return (Vec::new(), None);
+    }
+    let color = |c: u8| false_color((u32::from(c) * gain) as f32 / 255.0);
     let pictures = a.iter().zip(apart).map(|(a, apart)| Picture {
         width: a.width,
         height: a.height,
         pixels: apart.into_iter().map(color).collect(),
     });
-    (pictures.collect(), gain)
+    (pictures.collect(), Some(gain))
 }
 
 /// Steps of 8 bits from which a difference shows beside another picture; chosen by eye.

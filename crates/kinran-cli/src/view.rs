@@ -12,7 +12,7 @@ use kinran_scene::{Camera, Document, Environment, Light, LightKind, Scene};
 
 use crate::model::{ModelArgs, Place};
 use crate::outputs::refuse_input;
-use crate::skin::{SkinArgs, attach_skin};
+use crate::skin::{SkinArgs, SkinCurvatureName, attach_skin};
 use crate::surfaces::fuzz_fits;
 use crate::values::{direction, number, size, vector};
 use crate::{Error, Progress};
@@ -24,9 +24,10 @@ pub struct ViewArgs {
     #[arg(long, help_heading = "Picture", value_name = "WxH", default_value = "512x512", value_parser = size)]
     pub size: (u32, u32),
 
-    /// Light from all around: an equirectangular .hdr or .exr file, `studio` (built in), or `none`
-    #[arg(long, help_heading = "Light", value_name = "FILE|studio|none", default_value = "studio")]
-    pub env: EnvironmentChoice,
+    /// Light from all around: an equirectangular .hdr or .exr file, `studio` (built in), or `none` [default: studio, and
+    /// none for sheets of skin]
+    #[arg(long, help_heading = "Light", value_name = "FILE|studio|none")]
+    pub env: Option<EnvironmentChoice>,
 
     /// Turns the environment about the vertical, degrees, counter-clockwise seen from above
     #[arg(long, help_heading = "Light", value_name = "DEG", default_value = "0", allow_negative_numbers = true,
@@ -102,7 +103,45 @@ impl ViewArgs {
     /// The layer of an environment's file that the flag names: that of the command line's file.
     #[cfg(feature = "view")]
     pub(crate) fn layer_of(&self, choice: &EnvironmentChoice) -> Option<String> {
-        self.exr_layer.clone().filter(|_| *choice == self.env)
+        self.exr_layer.clone().filter(|_| *choice == self.environment())
+    }
+
+    /// Where light from all around comes from.
+    pub(crate) fn environment(&self) -> EnvironmentChoice {
+        self.env.clone().unwrap_or(EnvironmentChoice::Studio)
+    }
+
+    /// Refuses flags about what a scene does not have, or a picture of it does not show.
+    ///
+    /// # Errors
+    /// [`Error::Flag`] that names the first.
+    pub(crate) fn refuse_idle(&self, scene: &Scene, file: &str) -> Result<(), Error> {
+        let surrounded = self.environment() != EnvironmentChoice::None;
+        let has_skin = scene.materials.iter().any(|material| material.skin.is_some());
+        let has_detail = scene.materials.iter().any(|material| material.detail.is_some());
+        let shows_environment = matches!(self.background, Some(Background::Environment { .. }));
+        let (nothing_around, no_skin) =
+            ("there is no light from all around; name some with --env", "no material is skin");
+        let flags = [
+            ("--env-rotation", self.env_rotation != 0.0, surrounded, nothing_around),
+            ("--env-samples", self.env_samples != 1, surrounded, nothing_around),
+            ("--background env", shows_environment, surrounded, nothing_around),
+            ("--skin-curvature", self.skin.skin_curvature != SkinCurvatureName::default(), has_skin, no_skin),
+            ("--skin-penumbra", self.skin.skin_penumbra.is_some(), has_skin, no_skin),
+            ("--skin-normals", self.skin.skin_normals.is_some(), has_skin, no_skin),
+            (
+                "--detail",
+                self.detail != DetailName::default(),
+                has_detail,
+                "no material is blended from tiles",
+            ),
+        ];
+        match flags.into_iter().find(|(_, given, acts, _)| *given && !acts) {
+            Some((flag, _, _, why)) => {
+                Err(Error::flag_error_of(file, flag, format!("{why}; leave the flag out")))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Refuses pictures that would overwrite the model, a file that it names, or the environment. Other pictures are
@@ -116,7 +155,7 @@ impl ViewArgs {
         outputs: impl IntoIterator<Item = PathBuf>,
     ) -> Result<(), Error> {
         let mut inputs = vec![model.to_path_buf()];
-        if let EnvironmentChoice::File(path) = &self.env {
+        if let Some(EnvironmentChoice::File(path)) = &self.env {
             inputs.push(path.clone());
         }
         if let Ok(Place::File(file)) = Place::of(model) {
@@ -273,8 +312,9 @@ impl View {
                 Error::flag_error_of(file, format!("--camera {n}"), reason)
             })?,
         };
-        let environment = environment(&args.env, args.exr_layer.as_deref(), args.env_rotation)?;
-        let from_file = matches!(args.env, EnvironmentChoice::File(_));
+        let choice = args.environment();
+        let environment = environment(&choice, args.exr_layer.as_deref(), args.env_rotation)?;
+        let from_file = matches!(choice, EnvironmentChoice::File(_));
         let default_background =
             if from_file { Background::Environment { blur: 0.0 } } else { Background::Color(BACKDROP) };
         let view = View {
@@ -440,7 +480,7 @@ fn lights(scene: &Scene, args: &ViewArgs, camera: &Camera) -> Vec<Light> {
     };
     if !args.light.is_empty() {
         args.light.iter().copied().map(key).collect()
-    } else if scene.lights.is_empty() && args.env == EnvironmentChoice::None {
+    } else if scene.lights.is_empty() && args.environment() == EnvironmentChoice::None {
         vec![key((Mat3::from(camera.transform.matrix3) * KEY_LIGHT).normalize())]
     } else {
         scene.lights.clone()

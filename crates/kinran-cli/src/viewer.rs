@@ -75,8 +75,8 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     }
     // A name that is mistyped is told before a window opens.
     args.file.as_deref().map(Place::of).transpose()?;
-    refuse_layer(&args.view.env, args.view.exr_layer.as_deref())?;
-    if let EnvironmentChoice::File(path) = &args.view.env {
+    refuse_layer(&args.view.environment(), args.view.exr_layer.as_deref())?;
+    if let Some(EnvironmentChoice::File(path)) = &args.view.env {
         std::fs::metadata(path).map_err(|e| kinran_image::Error::io(path, e))?;
     }
     let parameters = match &args.parameters {

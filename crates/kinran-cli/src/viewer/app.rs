@@ -798,7 +798,7 @@ fn same_picture(a: &Parameters, b: &Parameters) -> bool {
 fn args_with_light(args: &ViewArgs, parameters: &Parameters) -> ViewArgs {
     let env: EnvironmentChoice = parameters.environment.parse().unwrap_or(EnvironmentChoice::Studio);
     let exr_layer = args.layer_of(&env);
-    ViewArgs { env, exr_layer, env_rotation: parameters.environment_rotation, ..args.clone() }
+    ViewArgs { env: Some(env), exr_layer, env_rotation: parameters.environment_rotation, ..args.clone() }
 }
 
 /// When a file of the shader folder was last saved.

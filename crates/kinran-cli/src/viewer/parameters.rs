@@ -255,17 +255,17 @@ impl Parameters {
                 Curve::None => "none",
             }
             .into(),
-            environment: match &view.env {
+            environment: match view.environment() {
                 EnvironmentChoice::Studio => "studio".into(),
                 EnvironmentChoice::None => "none".into(),
                 EnvironmentChoice::File(path) => path.to_string_lossy().into_owned(),
             },
             environment_rotation: view.env_rotation,
-            background: matches!(view.env, EnvironmentChoice::File(_)),
+            background: matches!(view.env, Some(EnvironmentChoice::File(_))),
             own_lights: view.light.is_empty(),
             intensities: Vec::new(),
             sun: Sun {
-                on: !view.light.is_empty() || view.env == EnvironmentChoice::None,
+                on: !view.light.is_empty() || view.environment() == EnvironmentChoice::None,
                 azimuth: towards.x.atan2(towards.z).to_degrees(),
                 elevation: towards.y.asin().to_degrees(),
                 lux: std::f32::consts::PI,

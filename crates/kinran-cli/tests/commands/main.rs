@@ -9,5 +9,6 @@ mod json;
 mod render;
 mod shaders;
 mod shape;
+mod sheets;
 mod trust;
 mod words;
