@@ -844,7 +844,13 @@ fn texels_of_a_model_that_cannot_be_are_changed_in_silence() {
                   laid on the surface";
     let number =
         "its roughness in \"rough\": 25 % of its texels are outside of 0 to 1 (0.50 to 1.50) and are clamped";
-    for (model, wanted) in [(&below, normal), (&rough, number)] {
+    // A height map in the place of normals.
+    let samples = (0..256).map(|i| (i * 5 % 251) as u8).collect();
+    let heights = Image::new(16, 16, Channels::R, Pixels::U8(samples)).unwrap();
+    let grey = folder.path().join("grey.glb");
+    std::fs::write(&grey, glb_with(&heights)).unwrap();
+    let none = "\"image 0\" does not look like one: it is grey";
+    for (model, wanted) in [(&below, normal), (&rough, number), (&grey, none)] {
         let out = folder.path().join("out");
         for words in [&["bake", text(model), "-o", text(&out), "--force"][..], &["inspect", text(model)]] {
             let report = kinran_json(words);

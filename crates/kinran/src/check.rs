@@ -273,10 +273,14 @@ impl Findings {
             let Some(texture) = self.texture_file(&place, &path, &bytes, Some(wanted)) else { continue };
             let size = (texture.levels[0].width, texture.levels[0].height);
             if let Some((fallback, bytes)) = &plain
-                && let Some(seen) = image_size_of(bytes).filter(|seen| *seen != size)
+                // Maps that are filtered together take the largest size of all.
+                && let Some(seen) = image_size_of(bytes).filter(|seen| seen.0 > size.0 || seen.1 > size.1)
             {
                 let [size, seen] = [size, seen].map(|(width, height)| format!("{width}x{height}"));
-                self.add(&place, format!("is {size}, and image {fallback}, which others see, is {seen}"));
+                self.add(
+                    &place,
+                    format!("is {size}, and image {fallback}, which others see, is larger: {seen}"),
+                );
             }
         }
     }

@@ -8,7 +8,9 @@ use common::{maps, model};
 use kinran::bake::{FolderOptions, GltfOptions, Which, folder, gltf, understand};
 use kinran::options::{Container, Form};
 use kinran::{Files, Finding, Memory, Task, check};
-use kinran_image::{Encoder, Texture, Transfer, decode_ktx2, encode_ktx2};
+use kinran_image::{
+    Channels, Encoder, Image, Pixels, Texture, Transfer, decode_ktx2, encode_ktx2, encode_png,
+};
 
 fn baked_maps() -> Memory {
     let mut how = FolderOptions::default();
@@ -21,11 +23,28 @@ fn baked_maps() -> Memory {
 }
 
 fn baked_model() -> Memory {
+    baked_model_of(model())
+}
+
+/// The same with a smaller roughness map.
+fn baked_model_of_two_sizes() -> Memory {
+    let smaller = Image::new(16, 8, Channels::Rgb, Pixels::U8(vec![90; 16 * 8 * 3])).unwrap();
+    let smaller = encode_png(&smaller).unwrap();
+    let is_it = |name: &str| name.ends_with("rough.png");
+    baked_model_of(
+        model()
+            .into_iter()
+            .map(|(name, bytes)| (name, if is_it(name) { smaller.clone() } else { bytes }))
+            .collect(),
+    )
+}
+
+fn baked_model_of(model: Vec<(&'static str, Vec<u8>)>) -> Memory {
     let mut how = GltfOptions::default();
     (how.all_textures, how.estimate_normals, how.curvature.of) = (true, true, Which::All);
     how.form = Form::Both;
     how.textures.encoder = Some(Encoder::Portable);
-    let (files, out) = (model().into_iter().collect::<Memory>(), Memory::new());
+    let (files, out) = (model.into_iter().collect::<Memory>(), Memory::new());
     gltf(&files, Path::new("models/drum.gltf"), &how, &out, Task::QUIET).unwrap();
     out
 }
@@ -48,7 +67,7 @@ fn only(findings: Vec<Finding>) -> String {
 #[test]
 fn what_was_just_baked_is_found_wrong() {
     let mut checked = 0;
-    for files in [baked_maps(), baked_model()] {
+    for files in [baked_maps(), baked_model(), baked_model_of_two_sizes()] {
         for (name, _) in files.files() {
             let end = name.extension().unwrap().to_str().unwrap();
             if ["ktx2", "dds", "gltf", "json"].contains(&end) {

@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use kinran_bake::aniso::{Reflectance, RoughnessMaps, Sheet, SheetRequest, bake_surface_and_metal};
-use kinran_bake::folder::{Green, GreenGuess, below_surface, guess_green, odd_lengths, outside_unit};
+use kinran_bake::folder::{
+    Green, GreenGuess, below_surface, guess_green, not_normals, odd_lengths, outside_unit,
+};
 use kinran_bake::metal::apart;
 use kinran_bake::{MaterialSurface, NoSurface, bake_plain, material_reflectance, material_surface};
 use kinran_image::{
@@ -581,6 +583,12 @@ pub fn texel_remarks(
 
 /// What the texels of a normal map say against it.
 fn normal_remarks(name: &str, image: &Image, said: Option<Green>) -> Vec<String> {
+    // Engine textures may hold red and green alone.
+    if let Some(why) = not_normals(image).filter(|_| image.channels != Channels::Rg) {
+        return vec![format!(
+            "its normal map \"{name}\" does not look like one: {why}; it is taken as it is"
+        )];
+    }
     let guess = guess_green(image);
     let green = match (guess, said) {
         (GreenGuess::Down, None) => Some(
