@@ -10,7 +10,9 @@ use kinran_bake::detail::{
     DetailOptions, Layer, LayerTransform, MapKind, Mask, Planes, Target, Tile, TileOptions, blend_level,
     solve,
 };
-use kinran_image::{Channels, Encoder, Encoding, Format, Image, Pixels, Preset, Texture, Transfer, untold};
+use kinran_image::{
+    Channels, Encoder, Encoding, Format, Image, Level, Pixels, Preset, Texture, Transfer, untold,
+};
 use kinran_shaders::{wgsl, with_needs};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 
@@ -62,6 +64,7 @@ fn upload(device: &wgpu::Device, queue: &wgpu::Queue, texture: &Texture) -> wgpu
         (Format::Bc5, _) => wgpu::TextureFormat::Bc5RgUnorm,
         (Format::Bc7, true) => wgpu::TextureFormat::Bc7RgbaUnormSrgb,
         (Format::Bc7, false) => wgpu::TextureFormat::Bc7RgbaUnorm,
+        (Format::Rgba8, false) => wgpu::TextureFormat::Rgba8Unorm,
         other => panic!("{other:?} is not uploaded here"),
     };
     let data: Vec<u8> = texture.levels.iter().flat_map(|level| level.data.iter().copied()).collect();
@@ -374,6 +377,74 @@ fn the_runtime_does_the_solvers_arithmetic() {
                     layers.len()
                 );
             }
+        }
+    }
+}
+
+/// A map as it is filtered, over a whole picture.
+const FILTERED: &str = "
+struct Size { texels: vec2f }
+@group(0) @binding(0) var<uniform> size: Size;
+@group(0) @binding(1) var map: texture_2d<f32>;
+@group(0) @binding(2) var repeating: sampler;
+@group(0) @binding(4) var mask: texture_2d<f32>;
+
+@vertex
+fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+    return vec4f(f32(i32(i & 1u) * 4 - 1), f32(i32(i >> 1u) * 4 - 1), 0.0, 1.0);
+}
+
+@fragment
+fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
+    let uv = position.xy / size.texels;
+    return textureSampleLevel(map, repeating, uv, 0.0) + 0.0 * textureSampleLevel(mask, repeating, uv, 0.0);
+}
+";
+
+/// The limits of Mesa's software device in docs/realtime.md.
+#[test]
+fn the_software_device_filters_as_graphics_cards_do() {
+    const SIDE: u32 = 64;
+    let Some(device) = device() else { return };
+    let name = device.0.adapter_info().name;
+    if !name.contains("llvmpipe") {
+        eprintln!("SKIPPED: {name} is no software device");
+        return;
+    }
+    let mask =
+        Tile::new(&scan(32, 5.0, 50.0), TileOptions::new(MapKind::Data, encoding(Format::Bc7))).unwrap();
+    let texture = |format, data| Texture {
+        format,
+        transfer: Transfer::Linear,
+        levels: vec![Level { width: SIDE, height: SIDE, data }],
+        metadata: Default::default(),
+    };
+    let texels: Vec<u8> = (0..SIDE * SIDE)
+        .flat_map(|i| [i * 37 % 251, i * 101 % 241, i * 11 % 239, 255].map(|sample| sample as u8))
+        .collect();
+    let bc7 = kinran_image::encode(encoding(Format::Bc7), &texels, SIDE, SIDE).unwrap();
+    // Blocks of all endpoints and codes, by a generator of Lehmer's.
+    let mut state = 1u32;
+    let mut random = || {
+        state = (u64::from(state) * 48271 % 0x7fff_ffff) as u32;
+        (state >> 8) as u8
+    };
+    let bc5: Vec<u8> = (0..SIDE * SIDE).map(|_| random()).collect();
+    for (format, data) in [(Format::Rgba8, texels), (Format::Bc7, bc7), (Format::Bc5, bc5)] {
+        let texture = texture(format, data);
+        // At five places along each texel.
+        let filtered = draw(&device, FILTERED, &texture, &mask, &[], (5 * SIDE, 5 * SIDE));
+        let from_step = |value: &f32| (255.0 * value - (255.0 * value).round()).abs();
+        let between = filtered.iter().flat_map(|texel| texel.iter().map(from_step)).fold(0.0, f32::max);
+        let at = draw(&device, FILTERED, &texture, &mask, &[], (SIDE, SIDE));
+        let decoded = texture.decode_level(0).unwrap();
+        let apart = |(a, b): (&[f32; 4], &[f32; 4])| [0, 1].map(|c| 255.0 * (a[c] - b[c]).abs());
+        let off = at.iter().zip(&decoded).flat_map(apart).fold(0.0, f32::max);
+        eprintln!("{name}, {format:?}: {between:.4} between steps of 255, {off:.2} off in texels");
+        assert!(between < 0.01, "{format:?}: filtered to more than 8 bits, {between} of a step between");
+        match format {
+            Format::Bc5 => assert!((1.0..1.7).contains(&off), "BC5 is {off} steps of 255 off, not up to 1.6"),
+            _ => assert!(off < 0.01, "{format:?} is {off} steps of 255 off"),
         }
     }
 }
