@@ -456,8 +456,7 @@ fn paths_that_are_no_documents_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let error = Scene::load(folder.path()).unwrap_err().to_string();
     assert!(
-        error.contains("is a directory; name a file in it")
-            && error.contains(folder.path().to_str().unwrap()),
+        error.contains("is a folder; name a file in it") && error.contains(folder.path().to_str().unwrap()),
         "{error}"
     );
     let gone = folder.path().join("gone.glb");
