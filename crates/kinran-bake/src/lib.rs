@@ -27,6 +27,7 @@
 pub mod aniso;
 pub mod cache;
 mod channels;
+mod coverage;
 pub mod curvature;
 pub mod detail;
 pub mod folder;
@@ -41,6 +42,7 @@ mod simd;
 pub mod skin_lut;
 pub mod stamps;
 
+pub use coverage::{bake_cutout, keep_coverage};
 pub use kinran_image::srgb::{linear_from_srgb, srgb_from_linear};
 pub use material::{MaterialSurface, NoSurface, material_reflectance, material_surface};
 pub use mips::{BAND_ROWS, Rgba8Level, bake_plain, compress_levels, pack_channels, plain_levels};

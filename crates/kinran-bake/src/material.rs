@@ -85,8 +85,8 @@ pub fn material_surface(scene: &Scene, material: usize) -> Result<MaterialSurfac
     })
 }
 
-/// What the texels of a material reflect, where its base colour lies as its surface does. `None` where it is the same
-/// everywhere or the maps lie apart; a sentence where something else says what reflects.
+/// What the texels of a material reflect, where its maps lie as its surface does. `None` where it is the same everywhere or
+/// an image is not there; a sentence where maps lie apart, or where something else says what reflects.
 ///
 /// # Errors
 /// The sentence.
@@ -99,34 +99,49 @@ pub fn material_reflectance(
     surface: &MaterialSurface,
 ) -> Result<Option<Reflectance>, String> {
     let m = &scene.materials[material];
+    let Some(place) = surface.place.as_ref().filter(|_| m.reflecting().next().is_some()) else {
+        return Ok(None);
+    };
+    const GLOSS: &str = "KHR_materials_pbrSpecularGlossiness";
+    if m.ignored_extensions.iter().any(|name| name == GLOSS) {
+        return Err(format!(
+            "material \"{}\": {GLOSS} says what reflects; its maps are filtered one by one",
+            m.name
+        ));
+    }
     let image = |place: &TextureRef| -> Option<Arc<Image>> { scene.images.get(place.image)?.clone() };
-    let Some(metallic) = m.metallic_roughness.as_ref().and_then(image) else { return Ok(None) };
-    let (Some(base), Some(place)) = (&m.base_color, &surface.place) else { return Ok(None) };
-    let Some(base_image) = image(base) else { return Ok(None) };
-    if !base.lies_as(place) {
-        return Err(format!(
-            "material \"{}\": baseColorTexture lies on the mesh in another way than the surface's maps; they are filtered \
-             one by one",
-            m.name
-        ));
+    if m.reflecting().any(|map| image(map).is_none()) {
+        return Ok(None);
     }
-    if let Some(other) = m.ignored_extensions.iter().find(|name| OTHER_REFLECTANCE.contains(&name.as_str())) {
-        return Err(format!(
-            "material \"{}\": {other} says what reflects; its maps are filtered one by one",
+    let map = |name, map: &Option<TextureRef>| match map {
+        Some(map) if !map.lies_as(place) => Err(format!(
+            "material \"{}\": {name} lies on the mesh in another way than the surface's maps; they are filtered one by one",
             m.name
-        ));
-    }
+        )),
+        map => Ok(map.as_ref().and_then(image)),
+    };
+    let scalar = |image: Option<Arc<Image>>, channel, factor| ScalarMap {
+        image: image.map(|image| (image, channel)),
+        factor,
+    };
+    let dielectric = m.dielectric.clone().unwrap_or_default();
     let maps = ReflectanceMaps::Metallic {
-        base: ColorMap { image: Some(base_image), factor: m.base_color_factor.truncate() },
-        metallic: ScalarMap { image: Some((metallic, 2)), factor: m.metallic_factor },
-        dielectric: Dielectric::default(),
+        base: ColorMap {
+            image: map("baseColorTexture", &m.base_color)?,
+            factor: m.base_color_factor.truncate(),
+        },
+        metallic: scalar(m.metallic_roughness.as_ref().and_then(image), 2, m.metallic_factor),
+        dielectric: Dielectric {
+            f0: dielectric.f0(),
+            strength: scalar(map("specularTexture", &dielectric.strength_texture)?, 3, dielectric.strength),
+            color: ColorMap {
+                image: map("specularColorTexture", &dielectric.color)?,
+                factor: dielectric.color_factor,
+            },
+        },
     };
     Ok(Some(Reflectance { maps, wrap: place.wrap }))
 }
-
-/// Extensions that say what a dielectric reflects, or what metal does.
-const OTHER_REFLECTANCE: [&str; 3] =
-    ["KHR_materials_ior", "KHR_materials_specular", "KHR_materials_pbrSpecularGlossiness"];
 
 fn apart(
     material: &Material,

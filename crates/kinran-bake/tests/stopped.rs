@@ -20,7 +20,7 @@ use kinran_bake::detail::{
 };
 use kinran_bake::metal::{Apart, base_and_metal};
 use kinran_bake::skin_lut::{INTERPOLATION_GRID, Profile, punctual_interpolation_error, punctual_table};
-use kinran_bake::{bake_plain, plain_levels};
+use kinran_bake::{bake_cutout, bake_plain, plain_levels};
 use kinran_image::{
     Cancelled, Channels, Encoder, Encoding, Error, Format, Image, Pixels, Preset, Transfer, full_level_count,
     level_size,
@@ -73,6 +73,10 @@ fn a_stopped_surface_is_baked_on() {
 #[test]
 fn a_stopped_colour_is_baked_on() {
     let image = noise(4);
+    let Pixels::U8(samples) = &image.pixels else { panic!("8 bits") };
+    let (colors, _) = samples.as_chunks::<3>();
+    let samples = colors.iter().flat_map(|[r, g, b]| [*r, *g, *b, *r]).collect();
+    let holes = Image::new(SIZE.0, SIZE.1, Channels::Rgba, Pixels::U8(samples)).unwrap();
     let wrap = [Wrap::Repeat; 2];
     assert_stops(
         "levels",
@@ -82,6 +86,9 @@ fn a_stopped_colour_is_baked_on() {
     );
     assert_stops("texture", texels(SIZE), of_image, |tick| {
         bake_plain(&image, Transfer::Srgb, RGBA8, Kernel::Box, wrap, tick)
+    });
+    assert_stops("cut-out texture", texels(SIZE), of_image, |tick| {
+        bake_cutout(&holes, 0.5, RGBA8, Kernel::Box, wrap, tick)
     });
 }
 

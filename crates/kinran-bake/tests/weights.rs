@@ -118,7 +118,7 @@ fn a_weight_is_not_what_its_texel_reflects() {
             true => Dielectric {
                 f0: 0.1,
                 strength: ScalarMap { image: Some((strength.clone(), 3)), factor: 0.7 },
-                color: ColorMap { image: Some(tint.clone()), factor: vec3(1.0, 0.6, 0.3) },
+                color: ColorMap { image: Some(tint.clone()), factor: vec3(1.0, 0.6, 30.0) },
             },
         };
         let reflectance = Reflectance {
@@ -139,8 +139,8 @@ fn a_weight_is_not_what_its_texel_reflects() {
             let specular = |c: usize| match extension {
                 false => 0.04,
                 true => {
-                    let tint = linear(bytes(&tint)[c]) * [1.0, 0.6, 0.3][c];
-                    0.1 * tint * 0.7 * f64::from(bytes(&strength)[3]) / 255.0
+                    let tint = linear(bytes(&tint)[c]) * [1.0, 0.6, 30.0][c];
+                    (0.1 * tint).min(1.0) * 0.7 * f64::from(bytes(&strength)[3]) / 255.0
                 }
             };
             let base = |c: usize| linear(bytes(&base)[c]) * f64::from(base_factor[c]);

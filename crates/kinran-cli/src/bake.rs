@@ -11,7 +11,7 @@ mod settings;
 use std::path::{Path, PathBuf};
 
 use kinran::bake::{FolderOptions, GltfOptions};
-use kinran::options::{Container, Form, TextureOptions};
+use kinran::options::{AlphaCoverage, Container, Form, TextureOptions};
 use kinran_bake::aniso::{Filter, Kernel};
 use kinran_bake::folder::{FolderError, Green, Hints, Role as MapRole};
 use kinran_image::{Encoder, Format, Preset, Transfer};
@@ -69,9 +69,15 @@ pub struct Args {
     pub kernel: Kernel,
 
     /// Filters colour, metalness and lobe together, so that what reflects and what scatters stays from afar; off averages each
-    /// by itself. Of a glTF file it needs --all-textures
+    /// by itself. For colours of a glTF file it takes --all-textures
     #[arg(long, value_name = "WHETHER", action = clap::ArgAction::Set, default_value = "on", value_parser = choice(SWITCH))]
     pub correlated: bool,
+
+    /// Keeps as much of a colour at or above the cutoff of its alpha from afar as nearby, so that leaves and hair do not thin
+    /// out: on is for glTF materials that are cut out, at their own cutoff; a number, 0 to 1, is the cutoff of a folder's
+    /// colour, or of whatever in a glTF file is not opaque; off averages alpha
+    #[arg(long, value_name = "CUTOFF", default_value = "on", value_parser = alpha_coverage)]
+    pub alpha_coverage: AlphaCoverage,
 
     /// What lies beyond the borders of a folder's maps; glTF files say it themselves
     #[arg(long, default_value = "wrap", value_parser = choice(EDGES))]
@@ -224,6 +230,18 @@ const ENCODERS: &Choices<Encoder> = &[
     (Encoder::Portable, "portable", "Rust's, the same on every machine"),
 ];
 
+/// A cutoff, or whether there is one.
+fn alpha_coverage(text: &str) -> Result<AlphaCoverage, String> {
+    match text {
+        "on" => Ok(AlphaCoverage::Masked),
+        "off" => Ok(AlphaCoverage::Off),
+        number => match number.parse() {
+            Ok(cutoff) if (0.0..=1.0).contains(&cutoff) => Ok(AlphaCoverage::At(cutoff)),
+            _ => Err("give on, off or a cutoff, 0 to 1".into()),
+        },
+    }
+}
+
 impl Args {
     /// Where the files go.
     fn output(&self) -> &Path {
@@ -256,7 +274,7 @@ impl Args {
         (how.normal_format, how.aniso_format, how.color_format) =
             (self.normal_format, self.aniso_format, self.color_format);
         (how.encoder, how.preset) = (self.encoder, self.preset);
-        how.correlated = self.correlated;
+        (how.correlated, how.alpha_coverage) = (self.correlated, self.alpha_coverage);
         how
     }
 

@@ -58,6 +58,8 @@ fn cases() -> Vec<Case> {
         "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 1.5 } } });
     let skin = json!({ "extensions": { "KINRAN_materials_skin":
         { "secondLobe": { "share": 0.4, "roughness": 0.2 }, "normalBlur": [0.9, 0.6, 0.2] } } });
+    let dielectric = json!({ "extensions": { "KHR_materials_ior": { "ior": 1.9 },
+        "KHR_materials_specular": { "specularFactor": 0.8, "specularColorFactor": [0.4, 1.0, 3.0] } } });
     let normal = ("normalTexture", "flat");
     vec![
         ("base colour", json!({}), vec![("pbrMetallicRoughness/baseColorTexture", "white")]),
@@ -111,6 +113,20 @@ fn cases() -> Vec<Case> {
             vec![("extensions/KINRAN_materials_fuzz/fuzzinessTexture", "white")],
         ),
         ("skin beside a normal map", skin, vec![normal]),
+        (
+            "a dielectric",
+            dielectric.clone(),
+            vec![
+                ("extensions/KHR_materials_specular/specularTexture", "white"),
+                ("extensions/KHR_materials_specular/specularColorTexture", "white"),
+            ],
+        ),
+        ("a dielectric beside a normal map", dielectric, vec![normal]),
+        (
+            "a dielectric as it is by default",
+            json!({ "extensions": { "KHR_materials_ior": {} } }),
+            vec![normal],
+        ),
     ]
 }
 
@@ -165,6 +181,8 @@ fn model(folder: &Path, materials: Vec<Value>) -> Vec<u8> {
         "KHR_materials_anisotropy",
         "KHR_materials_diffuse_transmission",
         "KHR_materials_emissive_strength",
+        "KHR_materials_ior",
+        "KHR_materials_specular",
         "KHR_materials_sheen",
         "KHR_materials_transmission",
         "KINRAN_materials_fuzz",

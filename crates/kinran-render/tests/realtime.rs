@@ -7,8 +7,8 @@ use kinran_render::realtime::{
     Channel, Gpu, GpuScene, MAX_LIGHTS, Realtime, Settings, ShaderSource, Target, left_out,
 };
 use kinran_render::reference::{
-    self, AnisoEncoding, Background, BoundTexture, Film, MipLevel, MipTexture, RenderScene, SurfaceTextures,
-    TextureFiltering, Translucency, look_at, render,
+    self, AnisoEncoding, Background, BoundTexture, Film, MipLevel, MipTexture, RenderDielectric, RenderScene,
+    SurfaceTextures, TextureFiltering, Translucency, look_at, render,
 };
 use kinran_render::tonemap::{Tonemap, to_srgb8};
 use kinran_scene::{AlphaMode, Camera, Environment, Instance, Light, LightKind, Scene, Wrap};
@@ -187,6 +187,31 @@ fn the_deferred_path_has_the_reference_s_lobes() {
         // Eight bits of colour are off by up to one percent, those of roughness move a highlight's peak by two.
         let what = format!("roughness {roughness}, metallic {metallic}");
         shot.agree(&what, &prepare(&scene, None), 0.01, 0.02);
+    }
+}
+
+#[test]
+fn dielectrics_reflect_as_in_the_reference() {
+    let shot = Shot::new(vec3(0.0, 0.0, 3.0), 0.5);
+    let dielectrics = [
+        (vec3(0.2, 0.05, 0.4), 1.0, 0.0),
+        (Vec3::splat(0.04), 0.0, 0.0),
+        (vec3(1.5, 0.6, 0.1), 0.7, 0.3),
+        (Vec3::ONE, 1.0, 0.0),
+    ];
+    for (f0, strength, metallic) in dielectrics {
+        let mut scene = scene(vec![sphere(48)], vec![material(vec3(0.9, 0.5, 0.2), metallic, 0.45)]);
+        scene.lights = vec![directional(vec3(-0.4, -0.3, -1.0), 2.0), point(vec3(1.2, 1.5, 2.0), 3.0)];
+        let uniform = Environment::from_fn(16, |d| Vec3::splat(0.4 + 0.3 * d.y));
+        let mut scene = prepare(&scene, Some(uniform));
+        let texel = |texel| Some(BoundTexture::constant(texel));
+        scene.materials[0].dielectric = Some(RenderDielectric {
+            f0,
+            color: texel([1.0, 0.8, 0.9, 1.0]),
+            strength,
+            strength_map: texel([0.1, 0.1, 0.1, 0.9]),
+        });
+        shot.agree(&format!("f0 {f0}, strength {strength}, metallic {metallic}"), &scene, 0.01, 0.02);
     }
 }
 

@@ -9,7 +9,7 @@ use kinran_render::{
         RenderScene, Settings, SurfaceTextures, Surroundings, TextureFiltering, look_at, render,
     },
 };
-use kinran_scene::{AlphaMode, Camera, Environment, Instance, Light, LightKind, Scene, Wrap};
+use kinran_scene::{AlphaMode, Camera, Dielectric, Environment, Instance, Light, LightKind, Scene, Wrap};
 use kinran_shading::{aniso_encode, aniso_from_alphas, m_n, multiscatter_compensation};
 use std::{f64::consts::PI, sync::Arc};
 
@@ -55,12 +55,17 @@ fn assert_near(what: &str, wanted: f64, got: f32, relative: f64) {
 /// Isotropic GGX with height-correlated Smith and Schlick, written from the papers in double precision: the single
 /// scattering BRDF for f0, without cosine.
 fn ggx(u: DVec3, v: DVec3, alpha: f64, f0: f64) -> f64 {
+    ggx_to(u, v, alpha, f0, 1.0)
+}
+
+/// The same for Schlick from `f0` to `f90` at grazing.
+fn ggx_to(u: DVec3, v: DVec3, alpha: f64, f0: f64, f90: f64) -> f64 {
     let h = (u + v).normalize();
     let a2 = alpha * alpha;
     let d = a2 / (PI * (h.z * h.z * (a2 - 1.0) + 1.0).powi(2));
     let lambda = |c: f64| 0.5 * ((1.0 + a2 * (1.0 / (c * c) - 1.0)).sqrt() - 1.0);
     let g = 1.0 / (1.0 + lambda(u.z) + lambda(v.z));
-    let f = f0 + (1.0 - f0) * (1.0 - v.dot(h)).powi(5);
+    let f = f0 + (f90 - f0) * (1.0 - v.dot(h)).powi(5);
     d * g * f / (4.0 * u.z * v.z)
 }
 
@@ -130,6 +135,49 @@ fn a_plane_under_one_light_has_the_closed_form_radiance() {
                 got,
                 0.03,
             );
+        }
+    }
+}
+
+/// `KHR_materials_specular` and `KHR_materials_ior`: reflectance from `strength · min(color · f0, 1)` to `strength`, mixed with
+/// that of metal; under it what the channel that reflects most leaves.
+#[test]
+fn a_dielectric_reflects_other_than_its_extensions_say() {
+    let light_direction = vec3(-0.8, 0.1, -0.5).normalize();
+    let u = -light_direction.as_dvec3();
+    let (roughness, base, eye) = (0.4_f64, 0.6_f64, vec3(2.5, 0.0, 0.7));
+    let cases = [
+        (Dielectric { ior: 1.8, ..Dielectric::default() }, 0.0),
+        (Dielectric { strength: 0.3, ..Dielectric::default() }, 0.0),
+        (Dielectric { strength: 0.0, ..Dielectric::default() }, 0.0),
+        (Dielectric { strength: 0.5, color_factor: vec3(1.0, 0.2, 40.0), ..Dielectric::default() }, 0.5),
+        (Dielectric { ior: 0.0, color_factor: vec3(0.9, 0.5, 0.1), ..Dielectric::default() }, 0.0),
+        (Dielectric { ior: 1.0, ..Dielectric::default() }, 0.0),
+    ];
+    for (dielectric, metallic) in cases {
+        let mut material = material(Vec3::splat(base as f32), metallic as f32, roughness as f32);
+        material.dielectric = Some(dielectric.clone());
+        let mut scene = scene(vec![square(0)], vec![material]);
+        scene.lights = vec![directional(light_direction, 5.0)];
+        let got = radiance_at_origin(&prepare(&scene, None), eye, 1);
+
+        let n_v = f64::from(eye.normalize().z);
+        let (v, alpha) = (dvec3((1.0 - n_v * n_v).sqrt(), 0.0, n_v), roughness * roughness);
+        let white = integrate(|u| ggx(u, v, alpha, 1.0) * u.z);
+        let (ior, strength) = (f64::from(dielectric.ior), f64::from(dielectric.strength));
+        let colors = dielectric.color_factor.as_dvec3().to_array();
+        let f0 = colors.map(|color| (((ior - 1.0) / (ior + 1.0)).powi(2) * color).min(1.0));
+        let largest = f0.into_iter().fold(0.0, f64::max);
+        let compensation = |f0: f64| 1.0 + f0 * (1.0 / white - 1.0);
+        let taken = strength * integrate(|u| ggx(u, v, alpha, largest) * u.z) * compensation(largest);
+        let f90 = strength + (1.0 - strength) * metallic;
+        for (channel, f0) in f0.into_iter().enumerate() {
+            let f0 = strength * f0 * (1.0 - metallic) + base * metallic;
+            let again = if f90 > 0.0 { compensation(f0 / f90) } else { 1.0 };
+            let specular = ggx_to(u, v, alpha, f0, f90) * again;
+            let wanted = 5.0 * u.z * (base * (1.0 - metallic) * (1.0 - taken) / PI + specular);
+            // As above.
+            assert_near(&format!("{dielectric:?}, channel {channel}"), wanted, got[channel], 0.03);
         }
     }
 }

@@ -404,6 +404,28 @@ pub(crate) struct Transmission {
 }
 
 #[derive(Deserialize)]
+pub(crate) struct Ior {
+    #[serde(default = "glass")]
+    pub(crate) ior: f32,
+}
+
+/// glTF's index of refraction where no file says any.
+fn glass() -> f32 {
+    1.5
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Specular {
+    #[serde(default = "one")]
+    pub(crate) specular_factor: f32,
+    pub(crate) specular_texture: Option<TextureInfo>,
+    #[serde(default = "one3")]
+    pub(crate) specular_color_factor: [f32; 3],
+    pub(crate) specular_color_texture: Option<TextureInfo>,
+}
+
+#[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct EmissiveStrength {
     #[serde(default = "one")]

@@ -57,8 +57,8 @@ pub use error::Error;
 pub use fuzz::{FUZZ_EXTENSION, Fuzz, FuzzAttenuation, FuzzDirection, FuzzLayer, FuzzPhase, SHEEN_MATCH};
 pub use load::{Maps, Needs};
 pub use scene::{
-    AlphaMode, Anisotropy, Camera, DiffuseTransmission, Instance, Light, LightKind, Material, Pose,
-    Primitive, Scene, Skin, SkinProfile, Source, VertexCurvature,
+    AlphaMode, Anisotropy, Camera, Dielectric, DiffuseTransmission, Instance, Light, LightKind, Material,
+    Pose, Primitive, Scene, Skin, SkinProfile, Source, VertexCurvature,
 };
 pub use tangent::arbitrary as any_tangent;
 pub use texture_ref::{TextureRef, Wrap};

@@ -19,9 +19,9 @@ use crate::compressed::{decompress, is_compressed};
 use crate::container::{GivenResolver, Purpose, Resolver, beside, fetch, given, split};
 use crate::obj::{glb_from_obj, names_materials};
 use crate::{
-    AlphaMode, Anisotropy, Camera, DiffuseTransmission, Error, FUZZ_EXTENSION, Fuzz, FuzzAttenuation,
-    FuzzDirection, FuzzLayer, FuzzPhase, Instance, Light, LightKind, Material, Primitive, Scene, Skin,
-    SkinProfile, Source, TextureRef, VertexCurvature, Wrap, json, tangent,
+    AlphaMode, Anisotropy, Camera, Dielectric, DiffuseTransmission, Error, FUZZ_EXTENSION, Fuzz,
+    FuzzAttenuation, FuzzDirection, FuzzLayer, FuzzPhase, Instance, Light, LightKind, Material, Primitive,
+    Scene, Skin, SkinProfile, Source, TextureRef, VertexCurvature, Wrap, json, tangent,
 };
 
 /// Extensions that may stand in `extensionsRequired`: those this module reads, and those that change how
@@ -64,11 +64,13 @@ const ADMITTED_EXTENSIONS: [&str; 32] = [
 ];
 
 /// Material extensions that [`Material`] represents.
-const READ_MATERIAL_EXTENSIONS: [&str; 9] = [
+const READ_MATERIAL_EXTENSIONS: [&str; 11] = [
     "KHR_materials_anisotropy",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
     "KHR_materials_sheen",
+    "KHR_materials_specular",
     "KHR_materials_transmission",
     "KINRAN_materials_aniso",
     "KINRAN_materials_detail",
@@ -115,11 +117,13 @@ pub struct Needs {
     pub rest_pose: bool,
     /// Which images are read. A texture of another map that has no image is left out of its material with a warning.
     pub maps: Maps,
+    /// Images that say what surfaces reflect are read too ([`Material::reflecting`]); where that fails, it is a warning.
+    pub reflectance: bool,
 }
 
 impl Needs {
     /// All there is.
-    pub const ALL: Needs = Needs { geometry: true, rest_pose: true, maps: Maps::All };
+    pub const ALL: Needs = Needs { geometry: true, rest_pose: true, maps: Maps::All, reflectance: true };
 }
 
 impl Scene {
@@ -327,7 +331,32 @@ struct Loader<'a> {
     scene: Scene,
 }
 
+/// Whether an image is read.
+#[derive(Clone, Copy, PartialEq)]
+enum Drawn {
+    Not,
+    /// If it can be.
+    Wished,
+    Needed,
+}
+
 impl Material {
+    /// The textures that say what reflects, where the reflectance of its surface may differ from place to place: of what is
+    /// not metal, and the base colour where there may be metal; none where all of the surface is the same.
+    pub fn reflecting(&self) -> impl Iterator<Item = &TextureRef> {
+        let is_surface =
+            self.normal.is_some() || self.metallic_roughness.is_some() || self.anisotropy.is_some();
+        let dielectric = self.dielectric.as_ref();
+        [
+            self.base_color.as_ref().filter(|_| self.metallic_factor > 0.0),
+            dielectric.and_then(|dielectric| dielectric.strength_texture.as_ref()),
+            dielectric.and_then(|dielectric| dielectric.color.as_ref()),
+        ]
+        .into_iter()
+        .filter(move |_| is_surface)
+        .flatten()
+    }
+
     /// The textures of the maps that are asked for.
     fn needed(&self, maps: Maps) -> Vec<&TextureRef> {
         let anisotropy = self.anisotropy.as_ref().filter(|a| a.strength > 0.0);
@@ -336,7 +365,14 @@ impl Material {
             &self.metallic_roughness,
             anisotropy.map_or(&None, |anisotropy| &anisotropy.texture),
         ];
-        let plain = [&self.base_color, &self.occlusion, &self.emissive];
+        let dielectric = self.dielectric.as_ref();
+        let plain = [
+            &self.base_color,
+            &self.occlusion,
+            &self.emissive,
+            dielectric.map_or(&None, |dielectric| &dielectric.strength_texture),
+            dielectric.map_or(&None, |dielectric| &dielectric.color),
+        ];
         match maps {
             Maps::None => Vec::new(),
             Maps::Surface => surface.into_iter().flatten().collect(),
@@ -501,6 +537,7 @@ impl Loader<'_> {
             detail: self.detail(&material.extensions, &what)?,
             diffuse_transmission,
             transmission: self.transmission(&material.extensions, &what)?,
+            dielectric: self.dielectric(&material.extensions, &what)?,
             alpha_mode: match material.alpha_mode {
                 json::AlphaMode::Opaque => AlphaMode::Opaque,
                 json::AlphaMode::Mask => AlphaMode::Mask {
@@ -525,6 +562,39 @@ impl Loader<'_> {
             self.warn(format!("{what}: transmissionTexture is left out; its factor is taken everywhere"));
         }
         self.unit(transmission.transmission_factor, &format!("{what}: transmissionFactor"))
+    }
+
+    /// `KHR_materials_specular` and `KHR_materials_ior`.
+    fn dielectric(&mut self, extensions: &json::Extensions, what: &str) -> Result<Option<Dielectric>, Error> {
+        let ior: Option<json::Ior> = self.extension(extensions, "KHR_materials_ior", what)?;
+        let specular: Option<json::Specular> = self.extension(extensions, "KHR_materials_specular", what)?;
+        if ior.is_none() && specular.is_none() {
+            return Ok(None);
+        }
+        let mut dielectric = Dielectric::default();
+        if let Some(json::Ior { ior }) = ior {
+            let [ior] = self.finite([ior], &format!("{what}: ior"))?;
+            if ior == 0.0 || ior >= 1.0 {
+                dielectric.ior = ior;
+            } else {
+                self.warn(format!("{what}: ior is {ior}, neither 0 nor at least 1; 1.5 was taken"));
+            }
+        }
+        if let Some(specular) = specular {
+            let what = |field| format!("{what}: {field}");
+            dielectric.strength = self.unit(specular.specular_factor, &what("specularFactor"))?;
+            dielectric.strength_texture =
+                self.map(Maps::Plain, &specular.specular_texture, &what("specularTexture"))?;
+            let color = self.finite(specular.specular_color_factor, &what("specularColorFactor"))?;
+            if color.iter().any(|channel| *channel < 0.0) {
+                let what = what("specularColorFactor");
+                self.warn(format!("{what} is {color:?}; what is below 0 was taken as 0"));
+            }
+            dielectric.color_factor = Vec3::from(color).max(Vec3::ZERO);
+            dielectric.color =
+                self.map(Maps::Plain, &specular.specular_color_texture, &what("specularColorTexture"))?;
+        }
+        Ok(Some(dielectric))
     }
 
     /// `KINRAN_materials_skin`.
@@ -1290,14 +1360,17 @@ impl Loader<'_> {
         Ok(())
     }
 
-    /// Decodes the images that materials use, and reads the runtime textures.
     /// Which images are drawn, and which are engine textures beside them.
-    fn needed_images(&self) -> (Vec<bool>, Vec<bool>) {
+    fn needed_images(&self) -> (Vec<Drawn>, Vec<bool>) {
         let count = self.root.images.len();
-        let (mut drawn, mut runtime) = (vec![false; count], vec![false; count]);
+        let (mut drawn, mut runtime) = (vec![Drawn::Not; count], vec![false; count]);
         let maps = self.needs.maps;
+        let materials = self.scene.materials.iter().filter(|_| self.needs.reflectance);
+        for texture in materials.flat_map(Material::reflecting) {
+            drawn[texture.image] = Drawn::Wished;
+        }
         for texture in self.scene.materials.iter().flat_map(|material| material.needed(maps)) {
-            drawn[texture.image] = true;
+            drawn[texture.image] = Drawn::Needed;
             if let Some(image) = texture.runtime.filter(|_| maps == Maps::All) {
                 runtime[image] = true;
             }
@@ -1314,26 +1387,40 @@ impl Loader<'_> {
     /// All that is to be read, in triangles.
     fn extent(&self) -> u64 {
         let (drawn, runtime) = self.needed_images();
-        let images = drawn.into_iter().chain(runtime).filter(|&needed| needed).count() as u64;
+        let drawn = drawn.into_iter().map(|drawn| drawn != Drawn::Not);
+        let images = drawn.chain(runtime).filter(|&needed| needed).count() as u64;
         let primitives = self.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
         let triangles = primitives.filter(|_| self.needs.geometry).map(|p| self.claimed_triangles(p));
         triangles.fold(images * IMAGE, u64::saturating_add)
     }
 
+    /// Decodes the images that materials use, and reads the runtime textures.
     fn images(&mut self, resolve: &Resolver<'_>) -> Result<(), Error> {
         let (drawn, runtime) = self.needed_images();
         let texels = AtomicU64::new(0);
         let images: Result<Vec<_>, Error> = (drawn.par_iter().enumerate())
             .map(|(i, &used)| {
-                if !used {
-                    return Ok(None);
+                if used == Drawn::Not {
+                    return Ok(Ok(None));
                 }
-                let image = self.image(i, &texels, resolve)?;
+                let image = self.image(i, &texels, resolve);
                 (self.tick)(IMAGE)?;
-                Ok(Some(Arc::new(image)))
+                match image {
+                    Ok(image) => Ok(Ok(Some(Arc::new(image)))),
+                    Err(error) if used == Drawn::Wished && !matches!(error, Error::Cancelled(_)) => {
+                        Ok(Err(error))
+                    }
+                    Err(error) => Err(error),
+                }
             })
             .collect();
-        self.scene.images = images?;
+        for image in images? {
+            let image = image.unwrap_or_else(|error| {
+                self.warn(format!("{error}; what it reflects is not known"));
+                None
+            });
+            self.scene.images.push(image);
+        }
         let textures = (runtime.into_par_iter().enumerate())
             .map(|(i, used)| {
                 if !used {
@@ -1348,7 +1435,7 @@ impl Loader<'_> {
             let texture = match texture {
                 Ok(texture) => texture.map(Arc::new),
                 // Without another image it is drawn itself, and an error was returned already.
-                Err(error) if !drawn => {
+                Err(error) if drawn == Drawn::Not => {
                     self.warn(format!("{error}; the PNG or JPEG beside it is taken"));
                     None
                 }

@@ -115,6 +115,36 @@ pub struct DiffuseTransmission {
     pub color: Option<TextureRef>,
 }
 
+/// `KHR_materials_specular` and `KHR_materials_ior`: what of a surface that is not metal reflects,
+/// `strength · min(color · f0, 1)` at normal incidence and `strength` at grazing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dielectric {
+    /// Index of refraction, at least 1, or 0: reflects all that the colour allows, as specular/glossiness has it.
+    pub ior: f32,
+    /// 0 to 1, multiplied with the texture's alpha.
+    pub strength: f32,
+    /// A strength.
+    pub strength_texture: Option<TextureRef>,
+    /// Linear, not negative, may exceed one; multiplied with the texture.
+    pub color_factor: Vec3,
+    /// sRGB colour.
+    pub color: Option<TextureRef>,
+}
+
+impl Default for Dielectric {
+    /// glTF's, where no extension says otherwise: 4 % of white light.
+    fn default() -> Self {
+        Dielectric { ior: 1.5, strength: 1.0, strength_texture: None, color_factor: Vec3::ONE, color: None }
+    }
+}
+
+impl Dielectric {
+    /// `((ior - 1) / (ior + 1))²`, before strength and colour.
+    pub fn f0(&self) -> f32 {
+        ((self.ior - 1.0) / (self.ior + 1.0)).powi(2)
+    }
+}
+
 /// What happens where a surface's alpha is below one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AlphaMode {
@@ -170,6 +200,8 @@ pub struct Material {
     pub diffuse_transmission: Option<DiffuseTransmission>,
     /// `KHR_materials_transmission`'s factor, 0 to 1: the share of the light that is not reflected which passes through.
     pub transmission: f32,
+    /// `KHR_materials_specular` and `KHR_materials_ior`, when one of them is present.
+    pub dielectric: Option<Dielectric>,
     /// Transparency.
     pub alpha_mode: AlphaMode,
     /// Both sides are lit; otherwise back faces are culled.
@@ -201,6 +233,7 @@ impl Default for Material {
             detail: None,
             diffuse_transmission: None,
             transmission: 0.0,
+            dielectric: None,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
             ignored_extensions: Vec::new(),
@@ -243,6 +276,7 @@ impl Material {
     /// Every texture of the material.
     pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
         let diffuse_transmission = self.diffuse_transmission.as_ref();
+        let dielectric = self.dielectric.as_ref();
         [
             self.normal.as_ref(),
             self.anisotropy.as_ref().and_then(|anisotropy| anisotropy.texture.as_ref()),
@@ -253,6 +287,8 @@ impl Material {
             self.emissive.as_ref(),
             diffuse_transmission.and_then(|d| d.texture.as_ref()),
             diffuse_transmission.and_then(|d| d.color.as_ref()),
+            dielectric.and_then(|d| d.strength_texture.as_ref()),
+            dielectric.and_then(|d| d.color.as_ref()),
         ]
         .into_iter()
         .flatten()

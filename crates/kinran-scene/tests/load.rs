@@ -64,6 +64,8 @@ fn everything() -> (Value, Vec<u8>) {
                 "KHR_materials_anisotropy": { "anisotropyStrength": 0.6, "anisotropyRotation": 1.57, "anisotropyTexture": { "index": 0 } },
                 "KHR_materials_diffuse_transmission": { "diffuseTransmissionFactor": 0.25, "diffuseTransmissionTexture": { "index": 0 } },
                 "KHR_materials_emissive_strength": { "emissiveStrength": 4 },
+                "KHR_materials_ior": { "ior": 1.33 },
+                "KHR_materials_specular": { "specularFactor": 0.5, "specularColorFactor": [1, 2, 0], "specularColorTexture": { "index": 0 } },
                 "KHR_materials_clearcoat": {},
             },
         }],
@@ -184,6 +186,10 @@ fn everything_arrives_where_it_belongs() {
     let through = material.diffuse_transmission.as_ref().unwrap();
     assert_eq!((through.factor, through.color_factor), (0.25, Vec3::ONE));
     assert!(through.texture.is_some() && through.color.is_none());
+    let dielectric = material.dielectric.as_ref().unwrap();
+    assert_eq!((dielectric.ior, dielectric.strength), (1.33, 0.5));
+    assert_eq!(dielectric.color_factor, Vec3::new(1., 2., 0.));
+    assert!(dielectric.strength_texture.is_none() && dielectric.color.is_some());
     let image = scene.images[0].as_ref().unwrap();
     assert_eq!(image.pixels, kinran_image::Pixels::U8((0..12).collect()));
 
@@ -682,7 +688,9 @@ fn a_damaged_part_stops_a_task_that_does_not_need_it() {
     bin[..4].copy_from_slice(&f32::NAN.to_le_bytes());
     let path = folder.path().join("a.glb");
     std::fs::write(&path, glb(&json, &bin)).unwrap();
-    let needs = |geometry, maps| Scene::load_part(&path, &[], &Needs { geometry, rest_pose: true, maps });
+    let needs = |geometry, maps| {
+        Scene::load_part(&path, &[], &Needs { geometry, rest_pose: true, maps, reflectance: false })
+    };
     let scene = needs(false, Maps::Surface).unwrap();
     assert!(scene.images[0].is_some(), "the normal map");
     assert!(scene.warnings.iter().any(|w| w.contains("emissiveTexture") && w.contains("left as it is")));
@@ -734,7 +742,8 @@ fn compressed_geometry_is_read_as_other_geometry() {
         let path = folder.path().join("noise.glb");
         std::fs::write(&path, empty).unwrap();
         assert!(Scene::load(&path).is_err(), "{name}: noise was geometry");
-        let needs = Needs { geometry: false, rest_pose: true, maps: kinran_scene::Maps::Surface };
+        let needs =
+            Needs { geometry: false, rest_pose: true, maps: kinran_scene::Maps::Surface, reflectance: false };
         assert!(Scene::load_part(&path, &[], &needs).is_ok(), "{name}: textures need geometry");
     }
 }

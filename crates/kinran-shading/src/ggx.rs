@@ -76,6 +76,10 @@ pub fn smith_aniso_g1(v: Vec3, alpha_t: f32, alpha_b: f32) -> f32 {
     2.0 * v.z / (v.z + (v * vec3(alpha_t, alpha_b, 1.0)).length())
 }
 
+/// Reflectance of a dielectric at normal incidence where nothing else is said: an index of refraction of 1.5
+/// (glTF 2.0, appendix B).
+pub const DIELECTRIC_F0: f32 = 0.04;
+
 /// Fresnel reflectance by Schlick's approximation (1994) from `f0` at normal incidence to one at grazing.
 pub fn schlick_f(f0: Vec3, v_h: f32) -> Vec3 {
     let m = (1.0 - v_h).clamp(0.0, 1.0);

@@ -47,8 +47,8 @@ pub use beckmann::{
 };
 pub use frame::{m_n, normal_from_xy};
 pub use ggx::{
-    ggx_aniso_d, ggx_d, ggx_matrix_d, ggx_vndf_pdf, ggx_vndf_sample, schlick_f, smith_aniso_g1,
-    smith_aniso_v, smith_matrix_v, smith_v,
+    DIELECTRIC_F0, ggx_aniso_d, ggx_d, ggx_matrix_d, ggx_vndf_pdf, ggx_vndf_sample, schlick_f,
+    smith_aniso_g1, smith_aniso_v, smith_matrix_v, smith_v,
 };
 pub use multiscatter::{ggx_albedo_alpha, ggx_directional_albedo, multiscatter_compensation};
 pub use sggx::{

@@ -2,6 +2,7 @@
 
 use kinran_bake::aniso::{Sheet, SurfaceOptions};
 use kinran_image::{Encoding, Role};
+use kinran_scene::{AlphaMode, Material};
 
 pub use kinran_bake::aniso::{Filter, Kernel};
 pub use kinran_image::{Encoder, Format, Preset};
@@ -54,6 +55,40 @@ impl Container {
     }
 }
 
+/// Which colours keep, at every level, as much alpha at or above a cutoff as level 0 has.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaCoverage {
+    /// Those of glTF materials that are cut out (`alphaMode` MASK), at their own cutoff.
+    #[default]
+    Masked,
+    /// None: alpha is averaged.
+    Off,
+    /// At this cutoff, 0 to 1: those of folders, and of glTF materials that are not opaque.
+    At(f32),
+}
+
+impl AlphaCoverage {
+    /// The cutoff for the texels of a folder's colour.
+    pub(crate) fn of_folder(self) -> Option<f32> {
+        match self {
+            AlphaCoverage::At(cutoff) => Some(cutoff),
+            AlphaCoverage::Masked | AlphaCoverage::Off => None,
+        }
+    }
+
+    /// The cutoff for the texels of a material's base colour.
+    pub(crate) fn of_material(self, material: &Material) -> Option<f32> {
+        let factor = material.base_color_factor.w;
+        match (self, material.alpha_mode) {
+            (AlphaCoverage::Masked, AlphaMode::Mask { cutoff }) => {
+                Some(cutoff / factor).filter(|cutoff| (0.0..=1.0).contains(cutoff))
+            }
+            (AlphaCoverage::At(cutoff), AlphaMode::Mask { .. } | AlphaMode::Blend) => Some(cutoff),
+            _ => None,
+        }
+    }
+}
+
 /// How textures are filtered, compressed and stored.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -65,6 +100,8 @@ pub struct TextureOptions {
     /// Whether lobes are weighed by what their texels reflect, and base colour and metalness are chosen together, where their
     /// maps lie as those of the surface do; they are by default. [`Filter::Naive`] does neither.
     pub correlated: bool,
+    /// Which colours keep their cut-out area from afar.
+    pub alpha_coverage: AlphaCoverage,
     /// File format.
     pub container: Container,
     /// Zstandard level of KTX2 files, 0 for none to 22; 3 by default.
@@ -88,6 +125,7 @@ impl Default for TextureOptions {
             filter: Filter::Ml,
             kernel: Kernel::Box,
             correlated: true,
+            alpha_coverage: AlphaCoverage::Masked,
             container: Container::Ktx2,
             zstd: 3,
             normal_format: None,
@@ -135,6 +173,12 @@ impl TextureOptions {
         if self.color_format == Some(Format::Rgba16F) {
             let reason = "colour maps hold 8 bits; choose bc7, bc1 or rgba8";
             return refused("color-format", Format::Rgba16F, reason.into());
+        }
+        if let AlphaCoverage::At(cutoff) = self.alpha_coverage
+            && !(0.0..=1.0).contains(&cutoff)
+        {
+            let (given, reason) = (cutoff.to_string(), "a cutoff is 0 to 1".into());
+            return Err(Error::Option { option: "alpha-coverage", given, file: None, reason });
         }
         if !(0..=22).contains(&self.zstd) {
             let (given, reason) = (self.zstd.to_string(), "levels are 0 to 22".into());

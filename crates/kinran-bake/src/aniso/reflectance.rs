@@ -10,6 +10,7 @@ use glam::Vec3;
 use kinran_image::srgb::linear_of_codes;
 use kinran_image::{Image, Transfer};
 use kinran_scene::Wrap;
+use kinran_shading::DIELECTRIC_F0;
 use rayon::prelude::*;
 
 use super::footprint::{Taps, area_taps};
@@ -37,9 +38,6 @@ pub struct Dielectric {
     /// `specularColorFactor` times `specularColorTexture`.
     pub color: ColorMap,
 }
-
-/// Reflectance of a dielectric at normal incidence (glTF 2.0, appendix B).
-const DIELECTRIC_F0: f32 = 0.04;
 
 impl Default for Dielectric {
     /// glTF's, where no extension says otherwise.
@@ -162,11 +160,13 @@ impl Reflectance {
                     Some(f0) => mean.fill(f0.element_sum() * third),
                     None => {
                         read_scalar(&dielectric.strength, at, strength);
-                        read_color(&dielectric.color, at, color);
+                        // Colours above one are at most one of what they reflect.
+                        let factor = dielectric.color.factor * dielectric.f0;
+                        let reflected = ColorMap { image: dielectric.color.image.clone(), factor };
+                        read_color(&reflected, at, color);
                         let [r, g, b] = &*color;
                         for (i, mean) in mean.iter_mut().enumerate() {
-                            let color = Vec3::new(r[i], g[i], b[i]);
-                            *mean = dielectric_f0(dielectric.f0, strength[i], color).element_sum() * third;
+                            *mean = (r[i] + g[i] + b[i]) * third * strength[i];
                         }
                     }
                 }

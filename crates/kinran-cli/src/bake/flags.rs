@@ -1,7 +1,7 @@
 //! What each flag of `kinran bake` acts on. A flag that cannot act is refused by its name, and never swallowed.
 
 use kinran::bake::Which;
-use kinran::options::Container;
+use kinran::options::{AlphaCoverage, Container};
 use kinran_bake::aniso::Kernel;
 use kinran_bake::curvature::Method;
 use kinran_scene::Wrap;
@@ -41,11 +41,12 @@ const fn flag(name: &'static str, on: On, given: fn(&Args) -> bool) -> Flag {
 }
 
 /// Every flag, in the order of `kinran bake --help`.
-pub(super) const FLAGS: [Flag; 42] = [
+pub(super) const FLAGS: [Flag; 43] = [
     flag("output", On::Run, |a| a.output.is_some()),
     flag("filter", On::Any, |a| a.filter.name() != "ml"),
     flag("kernel", On::Any, |a| a.kernel != Kernel::default()),
     flag("correlated", On::Any, |a| !a.correlated),
+    flag("alpha-coverage", On::Any, |a| a.alpha_coverage != AlphaCoverage::Masked),
     flag("edges", On::Folder, |a| a.edges != Wrap::Repeat),
     flag("form", On::Any, |a| a.form.is_some()),
     flag("container", On::Any, |a| a.container != Container::default()),

@@ -136,7 +136,8 @@ pub(super) fn inspect(path: &Path, args: &ModelArgs, console: &Console) -> Resul
 fn maps(scene: &Scene, document: Option<&Document>, m: &Material) -> Vec<MapReport> {
     let anisotropy = m.anisotropy.as_ref().and_then(|a| a.texture.as_ref());
     let diffuse_transmission = m.diffuse_transmission.as_ref();
-    let slots: [(&str, Option<&TextureRef>); 9] = [
+    let dielectric = m.dielectric.as_ref();
+    let slots: [(&str, Option<&TextureRef>); 11] = [
         ("baseColor", m.base_color.as_ref()),
         ("metallicRoughness", m.metallic_roughness.as_ref()),
         ("normal", m.normal.as_ref()),
@@ -146,6 +147,8 @@ fn maps(scene: &Scene, document: Option<&Document>, m: &Material) -> Vec<MapRepo
         ("emissive", m.emissive.as_ref()),
         ("diffuseTransmission", diffuse_transmission.and_then(|d| d.texture.as_ref())),
         ("diffuseTransmissionColor", diffuse_transmission.and_then(|d| d.color.as_ref())),
+        ("specular", dielectric.and_then(|d| d.strength_texture.as_ref())),
+        ("specularColor", dielectric.and_then(|d| d.color.as_ref())),
     ];
     let runtime = |image: usize| -> Option<RuntimeReport> {
         let texture = scene.textures.get(image)?.as_ref()?;

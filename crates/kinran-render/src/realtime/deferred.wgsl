@@ -33,6 +33,8 @@ fn light(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     surface.alpha_b = surface.alpha_t;
     surface.base_color = base.rgb;
     surface.metallic = factors.g;
+    surface.dielectric = vec3f(DIELECTRIC_F0);
+    surface.strength = 1.0;
     surface.occlusion = factors.b;
     surface.translucency = select(0.0, factors.a, base.a >= 0.5);
     surface.translucent_color = base.rgb;

@@ -17,6 +17,9 @@ struct Surface {
     alpha_b: f32,
     base_color: vec3f,
     metallic: f32,
+    // Reflectance at normal incidence of what is not metal, and the share that there is of it.
+    dielectric: vec3f,
+    strength: f32,
     // 0 opaque, 1: what is not reflected passes through.
     transmissive: f32,
     // Share of the scattered light that comes out on the other side, and its colour.
@@ -32,7 +35,9 @@ struct Surface {
 struct Lobe {
     // View in the shading frame.
     v: vec3f,
+    // At normal incidence, over what is reflected at grazing.
     base_reflectance: vec3f,
+    // For light that is scattered more than once, times what is reflected at grazing.
     compensation: vec3f,
     // Directional albedo of the specular lobe.
     albedo: vec3f,
@@ -60,19 +65,22 @@ fn lobe_of(surface: Surface, view: vec3f) -> Lobe {
     let alpha = ggx_albedo_alpha(v, surface.alpha_t, surface.alpha_b);
     let white = ggx_directional_albedo(v.z, alpha);
     let grazing = grazing_albedo(v.z, alpha);
-    let base_reflectance = mix(vec3f(DIELECTRIC_F0), surface.base_color, surface.metallic);
+    let weight = mix(surface.strength, 1.0, surface.metallic);
+    let reflectance = mix(surface.strength * surface.dielectric, surface.base_color, surface.metallic);
+    let base_reflectance = select(vec3f(0.0), reflectance / weight, weight > 0.0);
     let compensation = multiscatter_compensation(base_reflectance, v, surface.alpha_t, surface.alpha_b);
     let single = base_reflectance * (white - grazing) + grazing;
 
-    let dielectric = (DIELECTRIC_F0 * (white - grazing) + grazing)
-        * multiscatter_compensation(vec3f(DIELECTRIC_F0), v, surface.alpha_t, surface.alpha_b).x;
-    let inside = (1.0 - surface.metallic) * (1.0 - min(dielectric, 1.0));
+    let f0 = max(surface.dielectric.r, max(surface.dielectric.g, surface.dielectric.b));
+    let dielectric = (f0 * (white - grazing) + grazing)
+        * multiscatter_compensation(vec3f(f0), v, surface.alpha_t, surface.alpha_b).x;
+    let inside = (1.0 - surface.metallic) * (1.0 - surface.strength * min(dielectric, 1.0));
     let scattered = inside * (1.0 - surface.transmissive);
     return Lobe(
         v,
         base_reflectance,
-        compensation,
-        min(single * compensation, vec3f(1.0)),
+        weight * compensation,
+        weight * min(single * compensation, vec3f(1.0)),
         surface.base_color * scattered * (1.0 - surface.translucency),
         surface.translucent_color * scattered * surface.translucency,
         surface.base_color * inside * surface.transmissive,

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use encase::ShaderType;
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 use kinran_scene::AlphaMode;
+use kinran_shading::DIELECTRIC_F0;
 use wgpu::BindingResource::{Sampler, TextureView};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
@@ -72,6 +73,7 @@ pub(super) struct Material {
     khr: Vec2f,
     adjustment: Vec4f,
     translucency: Vec4f,
+    dielectric: Vec4f,
     transforms: [Vec4f; 2 * SLOTS],
     skin: Vec4f,
     skin_gloss: Vec4f,
@@ -80,7 +82,7 @@ pub(super) struct Material {
 
 /// Textures of a material, `white` where it has none.
 fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTexture; SLOTS] {
-    let translucency = m.translucency.as_ref();
+    let (translucency, dielectric) = (m.translucency.as_ref(), m.dielectric.as_ref());
     [
         m.surface.as_ref().map_or(white, |s| &s.normal),
         m.surface.as_ref().map_or(white, |s| &s.aniso),
@@ -90,6 +92,8 @@ fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTextur
         m.emissive.as_ref().unwrap_or(white),
         translucency.and_then(|t| t.map.as_ref()).unwrap_or(white),
         translucency.and_then(|t| t.color.as_ref()).unwrap_or(white),
+        dielectric.and_then(|d| d.strength_map.as_ref()).unwrap_or(white),
+        dielectric.and_then(|d| d.color.as_ref()).unwrap_or(white),
     ]
 }
 
@@ -106,6 +110,8 @@ fn uniform(m: &RenderMaterial, adjustment: Adjustment, curvature_range: f32) -> 
     };
     let Adjustment { roughness, anisotropy, rotation, normal_scale } = adjustment;
     let [skin, skin_gloss, skin_shadow] = skin(m, curvature_range);
+    let default = Vec3::splat(DIELECTRIC_F0).extend(1.0);
+    let dielectric = m.dielectric.as_ref().map_or(default, |d| d.f0.extend(d.strength));
     Material {
         base_color: m.base_color_factor.into(),
         emissive: m.emissive_factor.extend(m.occlusion_strength).into(),
@@ -114,6 +120,7 @@ fn uniform(m: &RenderMaterial, adjustment: Adjustment, curvature_range: f32) -> 
         khr: khr.into(),
         adjustment: [roughness, anisotropy, rotation, normal_scale].into(),
         translucency: m.translucency.as_ref().map_or(Vec4::ZERO, |t| t.color_factor.extend(t.factor)).into(),
+        dielectric: dielectric.into(),
         transforms: transforms(&slots(m, &BoundTexture::constant([1.0; 4]))),
         skin,
         skin_gloss,
@@ -244,6 +251,7 @@ fn path(m: &RenderMaterial) -> Path {
         Path::Blended
     } else if m.surface.is_some()
         || own_color
+        || m.dielectric.is_some()
         || m.skin.is_some()
         || fuzz::is_forward(m)
         || detail::is_forward(&m.detail)

@@ -28,6 +28,8 @@ pub use detail::{DetailShown, RenderDetail, RenderDetailLayer};
 pub use fuzz::{FUZZ_TILTS, FuzzCoefficients, FuzzFits, RenderFuzz};
 pub use geometry::{FLAT, Geometry, MAX_TRIANGLES, SurfacePoint};
 pub use render::{Background, Film, Settings, render};
-pub use scene::{AnisoEncoding, RenderMaterial, RenderScene, SurfaceTextures, Surroundings, Translucency};
+pub use scene::{
+    AnisoEncoding, RenderDielectric, RenderMaterial, RenderScene, SurfaceTextures, Surroundings, Translucency,
+};
 pub use skin::{RenderSkin, SkinCurvature, SkinTable, SkinTables};
 pub use texture::{MipLevel, MipTexture, TextureFiltering};

@@ -61,6 +61,19 @@ pub struct Translucency {
     pub color: Option<BoundTexture>,
 }
 
+/// What of a surface reflects that is not metal; see [`kinran_scene::Dielectric`].
+#[derive(Clone, Debug)]
+pub struct RenderDielectric {
+    /// Linear reflectance at normal incidence, multiplied with `color`, then one at most.
+    pub f0: Vec3,
+    /// Linear RGB.
+    pub color: Option<BoundTexture>,
+    /// Share of it all, 0 to 1, multiplied with A of `strength_map`.
+    pub strength: f32,
+    /// A is a share.
+    pub strength_map: Option<BoundTexture>,
+}
+
 /// A material with its textures.
 #[derive(Clone, Debug)]
 pub struct RenderMaterial {
@@ -87,6 +100,8 @@ pub struct RenderMaterial {
     pub emissive: Option<BoundTexture>,
     /// Pre-integrated skin in place of the Lambert lobe. [`RenderScene::new`] leaves it out: whoever has the tables sets it.
     pub skin: Option<RenderSkin>,
+    /// What reflects that is not metal; `None` is glTF's default, 4 % of white light.
+    pub dielectric: Option<RenderDielectric>,
     /// Light that passes through diffusely.
     pub translucency: Option<Translucency>,
     /// What alpha does.
@@ -297,6 +312,15 @@ impl TextureLoader<'_> {
                     map: load(&d.texture, Transfer::Linear)?,
                     color_factor: d.color_factor,
                     color: load(&d.color, Transfer::Srgb)?,
+                }),
+                None => None,
+            },
+            dielectric: match &m.dielectric {
+                Some(d) => Some(RenderDielectric {
+                    f0: d.color_factor * d.f0(),
+                    color: load(&d.color, Transfer::Srgb)?,
+                    strength: d.strength,
+                    strength_map: load(&d.strength_texture, Transfer::Linear)?,
                 }),
                 None => None,
             },

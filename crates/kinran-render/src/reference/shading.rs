@@ -2,8 +2,8 @@
 //!
 //! The model is glTF's metallic-roughness: a GGX lobe with height-correlated Smith masking, Schlick's Fresnel
 //! and multiscatter compensation; under it, for the part that is not metal, a Lambert lobe of what the
-//! specular lobe leaves for the view direction. `KHR_materials_diffuse_transmission` turns a share of that lobe
-//! to the other side of the surface.
+//! specular lobe leaves for the view direction. `KHR_materials_specular` and `KHR_materials_ior` say how much of it that
+//! part reflects; `KHR_materials_diffuse_transmission` turns a share of what is scattered to the other side of the surface.
 
 use super::{
     albedo::specular_albedo,
@@ -18,13 +18,10 @@ use super::{
 use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, Vec4, Vec4Swizzles};
 use kinran_scene::{AlphaMode, DetailMap};
 use kinran_shading::{
-    alpha_from_roughness, alphas_from_khr_anisotropy, aniso_decode, aniso_encode, aniso_from_alphas,
-    axis_from_direction, ggx_aniso_d, ggx_d, m_n, multiscatter_compensation, normal_from_xy, schlick_f,
-    smith_aniso_v, smith_v,
+    DIELECTRIC_F0, alpha_from_roughness, alphas_from_khr_anisotropy, aniso_decode, aniso_encode,
+    aniso_from_alphas, axis_from_direction, ggx_aniso_d, ggx_d, m_n, multiscatter_compensation,
+    normal_from_xy, schlick_f, smith_aniso_v, smith_v,
 };
-
-/// Reflectance of a dielectric at normal incidence (glTF 2.0, appendix B).
-const DIELECTRIC_F0: f32 = 0.04;
 
 /// A material evaluated for one point and one view.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +32,10 @@ pub(crate) struct Shading {
     pub(crate) v: Vec3,
     pub(crate) alpha_t: f32,
     pub(crate) alpha_b: f32,
+    /// Reflectance at normal incidence over `weight`.
     f0: Vec3,
+    /// Share of the specular lobe, that at grazing.
+    weight: f32,
     compensation: Vec3,
     /// Albedo of the Lambert lobe.
     pub(crate) diffuse: Vec3,
@@ -61,6 +61,14 @@ fn base_color(material: &RenderMaterial, point: &SurfacePoint, filtering: Textur
     material.base_color_factor * point.color * map
 }
 
+/// Reflectance at normal incidence of what is not metal, and the share that there is of it.
+fn dielectric(material: &RenderMaterial, point: &SurfacePoint, filtering: TextureFiltering) -> (Vec3, f32) {
+    let Some(dielectric) = &material.dielectric else { return (Vec3::splat(DIELECTRIC_F0), 1.0) };
+    let f0 = dielectric.f0 * sample(&dielectric.color, point, filtering).xyz();
+    let strength = dielectric.strength * sample(&dielectric.strength_map, point, filtering).w;
+    (f0.clamp(Vec3::ZERO, Vec3::ONE), strength.clamp(0.0, 1.0))
+}
+
 /// How much a surface hides, 0 to 1.
 pub(crate) fn opacity(material: &RenderMaterial, base_color: Vec4) -> f32 {
     match material.alpha_mode {
@@ -78,7 +86,8 @@ pub(crate) fn shadow_transmittance(
 ) -> Vec3 {
     let base = base_color(material, point, filtering);
     let opacity = opacity(material, base);
-    let through = base.xyz() * ((1.0 - DIELECTRIC_F0) * material.transmission);
+    let (f0, strength) = dielectric(material, point, filtering);
+    let through = base.xyz() * ((1.0 - strength * f0.max_element()) * material.transmission);
     Vec3::splat(1.0 - opacity) + opacity * through
 }
 
@@ -148,8 +157,11 @@ impl Shading {
         let v = frame.transpose() * view;
         debug_assert!(v.z > 0.0 && (frame.determinant().abs() - 1.0).abs() < 1e-3, "{frame}, v {v}");
 
-        let f0 = Vec3::splat(DIELECTRIC_F0).lerp(base.xyz(), metallic);
-        let inside = 1.0 - specular_albedo(DIELECTRIC_F0, v, alpha_t, alpha_b);
+        let (f0, strength) = dielectric(material, point, filtering);
+        let inside = 1.0 - strength * specular_albedo(f0.max_element(), v, alpha_t, alpha_b);
+        // Without a reflectance there is no lobe, whatever its colour.
+        let weight = strength + (1.0 - strength) * metallic;
+        let f0 = if weight > 0.0 { (strength * f0).lerp(base.xyz(), metallic) / weight } else { Vec3::ZERO };
         let passed = base.xyz() * (1.0 - metallic) * inside;
         let (scattered, translucent) = match &material.translucency {
             Some(t) => {
@@ -169,6 +181,7 @@ impl Shading {
             alpha_t,
             alpha_b,
             f0,
+            weight,
             compensation: multiscatter_compensation(f0, v, alpha_t, alpha_b),
             diffuse,
             translucent: translucent * opaque,
@@ -200,7 +213,7 @@ impl Shading {
             let second = ggx_d(h.z, skin.second_alpha) * smith_v(u.z, self.v.z, skin.second_alpha);
             lobe += skin.second_share * (second - lobe);
         }
-        lobe * schlick_f(self.f0, self.v.dot(h)) * self.compensation
+        lobe * self.weight * schlick_f(self.f0, self.v.dot(h)) * self.compensation
     }
 
     /// All of the BSDF for a light along `u` in the shading frame, per steradian, times the cosine: what is reflected
@@ -231,7 +244,7 @@ impl Shading {
     /// How bright the specular and the diffuse lobe of the base are, roughly, for sampling.
     pub(crate) fn brightness(&self) -> (f32, f32) {
         let specular = specular_albedo(self.f0.max_element(), self.v, self.alpha_t, self.alpha_b);
-        (specular, self.diffuse.max_element())
+        (self.weight * specular, self.diffuse.max_element())
     }
 }
 

@@ -6,7 +6,7 @@ use kinran_bake::aniso::{Sheet, SheetRequest, bake_surface_and_metal};
 use kinran_bake::folder::{
     ASSUMED_ROUGHNESS, Folder, Hints, LoadedMap, LoadedMaterial, MaterialMaps, Role as MapRole, scan_in,
 };
-use kinran_bake::{bake_plain, pack_channels};
+use kinran_bake::{bake_cutout, bake_plain, pack_channels};
 use kinran_image::{Encoding, Files, Image, Role, Transfer};
 use rayon::prelude::*;
 
@@ -199,7 +199,8 @@ fn bake_material(
         let reflectance = material.reflectance().filter(|_| how.textures.is_correlated());
         let apart = reflectance.as_ref().and_then(|reflectance| why_apart(&material.name, reflectance, maps));
         warnings.extend(apart);
-        let together = together(maps, reflectance.as_ref(), &name, &how.textures, task)?;
+        let cutoff = how.textures.alpha_coverage.of_folder();
+        let together = together(maps, reflectance.as_ref(), cutoff, &name, &how.textures, task)?;
         chosen = together.color;
         let (maps, metallic_levels) = (&together.maps, &together.metallic);
         let size = maps.size();
@@ -274,7 +275,12 @@ fn bake_map(
     };
     let averaging = task.begin(Stage::Averaging(content), name, mip_texels((image.width, image.height)))?;
     let (kernel, wrap) = (how.textures.kernel, how.hints.wrap);
-    let texture = bake_plain(image, transfer, encoding, kernel, wrap, &|texels| averaging.tick(texels))?;
+    let tick = |texels| averaging.tick(texels);
+    let cutoff = how.textures.alpha_coverage.of_folder().filter(|_| content == Content::Color);
+    let texture = match cutoff {
+        Some(cutoff) => bake_cutout(image, cutoff, encoding, kernel, wrap, &tick)?,
+        None => bake_plain(image, transfer, encoding, kernel, wrap, &tick)?,
+    };
     drop(averaging);
     put_texture(&how.textures, &format!("{name}_{}", content.name()), content, texture, out)
 }

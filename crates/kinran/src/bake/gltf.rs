@@ -2,19 +2,22 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use kinran_bake::aniso::{Reflectance, RoughnessMaps, Sheet, SheetRequest, bake_surface_and_metal};
 use kinran_bake::folder::{
     Green, GreenGuess, below_surface, guess_green, not_normals, odd_lengths, outside_unit,
 };
 use kinran_bake::metal::apart;
-use kinran_bake::{MaterialSurface, NoSurface, bake_plain, material_reflectance, material_surface};
+use kinran_bake::{
+    MaterialSurface, NoSurface, bake_cutout, bake_plain, material_reflectance, material_surface,
+};
 use kinran_image::{
     Channels, Encoder, Encoding, Files, Format, Image, Memory, Pixels, Preset, Role, Texture, Transfer,
     decode_image, encode_png, image_size_of,
 };
 use kinran_scene::{
-    Document, FUZZ_EXTENSION, Maps, Material, Needs, Scene, Slot, TextureExtension, TextureRef,
+    Dielectric, Document, FUZZ_EXTENSION, Maps, Material, Needs, Scene, Slot, TextureExtension, TextureRef,
 };
 use serde_json::Value;
 
@@ -49,7 +52,7 @@ pub struct Surface {
     pub materials: Vec<usize>,
     /// Their maps.
     pub maps: MaterialSurface,
-    /// What they reflect, where that differs from texel to texel and their maps are filtered together.
+    /// What they reflect, where that differs from texel to texel and their base colours are baked too.
     pub reflectance: Option<Reflectance>,
     key: Key,
 }
@@ -95,6 +98,7 @@ pub fn understand_gltf(
         geometry: how.asks(&document),
         rest_pose: true,
         maps: if how.all_textures { Maps::Plain } else { Maps::Surface },
+        reflectance: how.textures.is_correlated(),
     };
     let reading = task.begin(Stage::Reading, file_name(input), 0)?;
     let expect = |units| reading.expect(units);
@@ -227,6 +231,8 @@ struct Colored {
     name: String,
     place: TextureRef,
     transfer: Transfer,
+    /// Of its alpha, where it is cut out.
+    cutoff: Option<f32>,
     /// The surface whose metalness it is chosen together with.
     surface: Option<usize>,
     /// What came of that.
@@ -262,18 +268,21 @@ impl Plan {
         let materials = document.material_count().min(scene.materials.len());
         for material in (0..materials).filter(|_| how.all_textures) {
             let m = &scene.materials[material];
+            let is_chosen =
+                |surface: &Surface| surface.materials.contains(&material) && surface.is_chosen_together();
+            let of_surface = all.iter().position(is_chosen);
             let occlusion = m.occlusion.as_ref().filter(|_| !occlusion_is_packed(scene, material));
             for (slot, place, transfer) in [
                 (Slot::BaseColor, m.base_color.as_ref(), Transfer::Srgb),
                 (Slot::Emissive, m.emissive.as_ref(), Transfer::Srgb),
                 (Slot::Occlusion, occlusion, Transfer::Linear),
             ] {
+                let surface = of_surface.filter(|_| slot == Slot::BaseColor);
                 let Some(place) = place.filter(|place| scene.images[place.image].is_some()) else { continue };
-                let is_chosen =
-                    |surface: &Surface| surface.materials.contains(&material) && surface.is_chosen_together();
-                let surface = all.iter().position(is_chosen).filter(|_| slot == Slot::BaseColor);
+                let cutoff = how.textures.alpha_coverage.of_material(m).filter(|_| slot == Slot::BaseColor);
                 let is_it = |c: &&mut Colored| c.place == *place && c.transfer == transfer;
-                let known = colors.iter_mut().filter(is_it).find(|c| c.surface == surface);
+                let known =
+                    colors.iter_mut().filter(is_it).find(|c| (c.surface, c.cutoff) == (surface, cutoff));
                 match known {
                     Some(known) => known.slots.push((material, slot)),
                     None => {
@@ -281,15 +290,17 @@ impl Plan {
                             name: String::new(),
                             place: place.clone(),
                             transfer,
+                            cutoff,
                             surface,
                             chosen: None,
                             slots: vec![(material, slot)],
                         };
                         let image = file_stem(&document.image_name(place.image));
                         if let Some(other) = colors.iter_mut().find(is_it) {
+                            let what = if other.surface == surface { "cutoff" } else { "metalness" };
                             let other = &scene.materials[other.slots[0].0].name;
                             notes.push(format!(
-                                "the base colour of \"{other}\" and \"{}\" becomes two textures, since their metalness differs",
+                                "the base colour of \"{other}\" and \"{}\" becomes two textures, since their {what} differs",
                                 m.name
                             ));
                         }
@@ -513,17 +524,23 @@ fn surfaces(
             Ok(mut maps) => {
                 let mut key = Key::new(scene, material);
                 maps.maps.normal.y_down = how.green == Some(Green::Down);
-                let is_asked = how.all_textures && how.textures.is_correlated();
-                let reflectance = match material_reflectance(scene, material, &maps) {
-                    // Where all reflects the same, materials of other colours share their surface.
-                    Ok(of) => of.filter(|of| is_asked && of.weights(maps.maps.size()).is_some()),
+                let correlated = how.textures.is_correlated();
+                let mut reflectance = match material_reflectance(scene, material, &maps) {
+                    Ok(of) => of.filter(|_| correlated),
                     Err(reason) => {
-                        warnings.extend(is_asked.then_some(reason));
+                        warnings.extend(correlated.then_some(reason));
                         None
                     }
                 };
+                let size = maps.maps.size();
+                maps.maps.weights = reflectance.as_ref().and_then(|of| of.weights(size)).map(Arc::new);
+                // Where all reflects the same, materials of other colours share their surface.
+                if maps.maps.weights.is_some() {
+                    key.color = Some(Key::of_color(&scene.materials[material], &how.textures));
+                }
+                // A base colour that stays as it is gets its levels from the viewer.
+                reflectance = reflectance.filter(|_| how.all_textures && maps.maps.weights.is_some());
                 if let Some(reflectance) = &reflectance {
-                    key.color = Key::of_color(&scene.materials[material]);
                     let name = format!("material \"{}\"", scene.materials[material].name);
                     warnings.extend(why_apart(&name, reflectance, &maps.maps));
                 }
@@ -619,13 +636,18 @@ struct Key {
     roughness: f32,
     anisotropy: Option<(f32, f32)>,
     occlusion_packed: bool,
-    /// Base colour and factors, where the surface is filtered with what it reflects.
-    color: Option<(TextureRef, [f32; 3], f32)>,
+    /// Where the surface is filtered with what it reflects.
+    color: Option<OfColor>,
 }
 
+/// Base colour with its factor, the factor of metalness, what of the rest reflects, and the cutoff.
+type OfColor = (Option<TextureRef>, [f32; 3], f32, Option<Dielectric>, Option<f32>);
+
 impl Key {
-    fn of_color(m: &Material) -> Option<(TextureRef, [f32; 3], f32)> {
-        Some((m.base_color.clone()?, m.base_color_factor.truncate().to_array(), m.metallic_factor))
+    fn of_color(m: &Material, how: &TextureOptions) -> OfColor {
+        let factor = m.base_color_factor.truncate().to_array();
+        let cutoff = how.alpha_coverage.of_material(m);
+        (m.base_color.clone(), factor, m.metallic_factor, m.dielectric.clone(), cutoff)
     }
 
     fn new(scene: &Scene, material: usize) -> Self {
@@ -700,7 +722,8 @@ impl SurfaceBaker<'_> {
         let (options, materials) = (&self.how.textures, surface.materials.as_slice());
         let m = &self.scene.materials[materials[0]];
         let reflectance = surface.reflectance.as_ref();
-        let together = together(&surface.maps.maps, reflectance, &m.name, options, self.task)?;
+        let cutoff = options.alpha_coverage.of_material(m);
+        let together = together(&surface.maps.maps, reflectance, cutoff, &m.name, options, self.task)?;
         let (maps, metallic) = (&together.maps, &together.metallic);
         let size = maps.size();
         let mr = m.metallic_roughness.as_ref().and_then(|place| self.scene.images[place.image].clone());
@@ -934,9 +957,13 @@ fn bake_colors(
                 averaging.tick(mip_texels((image.width, image.height)))?;
                 texture
             }
-            None => bake_plain(image, color.transfer, encoding, kernel, place.wrap, &|texels| {
-                averaging.tick(texels)
-            })?,
+            None => {
+                let tick = |texels| averaging.tick(texels);
+                match color.cutoff {
+                    Some(cutoff) => bake_cutout(image, cutoff, encoding, kernel, place.wrap, &tick)?,
+                    None => bake_plain(image, color.transfer, encoding, kernel, place.wrap, &tick)?,
+                }
+            }
         };
         let outputs = put_texture(&how.textures, &color.name, content, texture, out)?;
         let (material, slot) = color.slots[0];

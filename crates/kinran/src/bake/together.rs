@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use kinran_bake::aniso::{Reflectance, SurfaceMaps};
-use kinran_bake::compress_levels;
+use kinran_bake::aniso::{Reflectance, ReflectanceMaps, SurfaceMaps};
 use kinran_bake::metal::{Apart, apart, base_and_metal};
+use kinran_bake::{compress_levels, keep_coverage};
 
 use kinran_image::{Role, Texture, Transfer};
 
@@ -24,9 +24,11 @@ pub(super) struct Together {
 }
 
 /// Filters base colour and metalness of a surface, and weighs its texels; as it is where nothing is said of what it reflects.
+/// The base colour is cut out at `cutoff` where there is one.
 pub(super) fn together(
     maps: &SurfaceMaps,
     reflectance: Option<&Reflectance>,
+    cutoff: Option<f32>,
     name: &str,
     how: &TextureOptions,
     task: Task<'_>,
@@ -34,17 +36,29 @@ pub(super) fn together(
     let mut together = Together { maps: maps.clone(), color: None, metallic: Vec::new() };
     let Some(reflectance) = reflectance else { return Ok(together) };
     let surface = maps.size();
-    together.maps.weights = reflectance.weights(surface).map(Arc::new);
+    if together.maps.weights.is_none() {
+        together.maps.weights = reflectance.weights(surface).map(Arc::new);
+    }
     if apart(reflectance, surface).is_none() {
         let own = reflectance.size();
         let size = (own.0.max(surface.0), own.1.max(surface.1));
         let texels = mip_texels(size) + mip_texels(own);
         let choosing = task.begin(Stage::Averaging(Content::Color), name, texels)?;
-        let pair = match base_and_metal(reflectance, surface, how.kernel, &|texels| choosing.tick(texels)) {
+        let mut pair = match base_and_metal(reflectance, surface, how.kernel, &|texels| choosing.tick(texels))
+        {
             Ok(pair) => pair,
             Err(Apart::Cancelled(stopped)) => return Err(stopped.into()),
             Err(_) => return Ok(together),
         };
+        let base = match &reflectance.maps {
+            ReflectanceMaps::Metallic { base, .. } => base.image.as_deref(),
+            ReflectanceMaps::Specular(_) => None,
+        };
+        if let (Some(cutoff), Some(image)) = (cutoff, base) {
+            keep_coverage(image, cutoff, how.kernel, reflectance.wrap, &mut pair.color, &|_| {
+                choosing.tick(0)
+            })?;
+        }
         let encoding = how.encoding(Role::Color, how.color_format);
         let tick = |texels| choosing.tick(texels);
         together.color = Some(compress_levels(&pair.color, Transfer::Srgb, encoding, &tick)?);
