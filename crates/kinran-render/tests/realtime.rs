@@ -204,13 +204,8 @@ fn dielectrics_reflect_as_in_the_reference() {
         scene.lights = vec![directional(vec3(-0.4, -0.3, -1.0), 2.0), point(vec3(1.2, 1.5, 2.0), 3.0)];
         let uniform = Environment::from_fn(16, |d| Vec3::splat(0.4 + 0.3 * d.y));
         let mut scene = prepare(&scene, Some(uniform));
-        let texel = |texel| Some(BoundTexture::constant(texel));
-        scene.materials[0].dielectric = Some(RenderDielectric {
-            f0,
-            color: texel([1.0, 0.8, 0.9, 1.0]),
-            strength,
-            strength_map: texel([0.1, 0.1, 0.1, 0.9]),
-        });
+        let map = Some(BoundTexture::constant([1.0, 0.8, 0.9, 0.9]));
+        scene.materials[0].dielectric = Some(RenderDielectric { f0, strength, map });
         shot.agree(&format!("f0 {f0}, strength {strength}, metallic {metallic}"), &scene, 0.01, 0.02);
     }
 }

@@ -1,7 +1,7 @@
 //! The reference renderer against closed forms, quadrature and itself.
 
 use glam::{Affine3A, DVec3, Mat3, Vec2, Vec3, Vec4, dvec3, vec2, vec3};
-use kinran_image::untold;
+use kinran_image::{Channels, Image, Pixels, untold};
 use kinran_render::{
     Error,
     reference::{
@@ -9,7 +9,9 @@ use kinran_render::{
         RenderScene, Settings, SurfaceTextures, Surroundings, TextureFiltering, look_at, render,
     },
 };
-use kinran_scene::{AlphaMode, Camera, Dielectric, Environment, Instance, Light, LightKind, Scene, Wrap};
+use kinran_scene::{
+    AlphaMode, Camera, Dielectric, Environment, Instance, Light, LightKind, Scene, TextureRef, Wrap,
+};
 use kinran_shading::{aniso_encode, aniso_from_alphas, m_n, multiscatter_compensation};
 use std::{f64::consts::PI, sync::Arc};
 
@@ -178,6 +180,50 @@ fn a_dielectric_reflects_other_than_its_extensions_say() {
             let wanted = 5.0 * u.z * (base * (1.0 - metallic) * (1.0 - taken) / PI + specular);
             // As above.
             assert_near(&format!("{dielectric:?}, channel {channel}"), wanted, got[channel], 0.03);
+        }
+    }
+}
+
+/// The colour of a specular map is in red, green and blue of one image, its share in the alpha of another, which may be larger.
+#[test]
+fn a_specular_map_is_read_from_a_channel_that_is_not_its_own() {
+    let image = |side: u32, texel: [u8; 4]| {
+        let samples = texel.repeat((side * side) as usize);
+        Some(Arc::new(Image::new(side, side, Channels::Rgba, Pixels::U8(samples)).unwrap()))
+    };
+    let place = |image| TextureRef {
+        image,
+        runtime: None,
+        uv_set: 0,
+        transform: Mat3::IDENTITY,
+        wrap: [Wrap::Repeat; 2],
+    };
+    let white = [1.0; 3];
+    let tint = [0.0, 1.0, 0.215_860_5];
+    for (name, color, share, wanted) in [
+        ("none", false, false, None),
+        ("colour", true, false, Some((2, tint, 1.0))),
+        ("share", false, true, Some((4, white, 0.2))),
+        ("both", true, true, Some((4, tint, 0.2))),
+    ] {
+        let mut scene = scene(vec![square(0)], vec![material(Vec3::ONE, 0.0, 0.5)]);
+        scene.images = vec![image(2, [0, 255, 128, 7]), image(4, [9, 9, 9, 51])];
+        scene.materials[0].dielectric = Some(Dielectric {
+            color: color.then(|| place(0)),
+            strength_texture: share.then(|| place(1)),
+            ..Dielectric::default()
+        });
+        let prepared = prepare(&scene, None);
+        let map = &prepared.materials[0].dielectric.as_ref().unwrap().map;
+        let Some((side, color, share)) = wanted else {
+            assert!(map.is_none(), "{name}: a map without an image");
+            continue;
+        };
+        let levels = &map.as_ref().unwrap().texture.levels;
+        assert_eq!((levels[0].width, levels[0].height), (side, side), "{name}: size");
+        for texel in levels.iter().flat_map(|level| &level.texels) {
+            let apart = Vec4::from(*texel) - Vec3::from(color).extend(share);
+            assert!(apart.abs().max_element() < 1e-5, "{name}: wanted {color:?} {share}, got {texel:?}");
         }
     }
 }

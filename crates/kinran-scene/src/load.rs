@@ -593,6 +593,15 @@ impl Loader<'_> {
             dielectric.color_factor = Vec3::from(color).max(Vec3::ZERO);
             dielectric.color =
                 self.map(Maps::Plain, &specular.specular_color_texture, &what("specularColorTexture"))?;
+            if let (Some(strength), Some(color)) = (&dielectric.strength_texture, &dielectric.color)
+                && !strength.lies_as(color)
+            {
+                let what = what("specularTexture");
+                self.warn(format!(
+                    "{what} lies on the mesh in another way than specularColorTexture; it was left out"
+                ));
+                dielectric.strength_texture = None;
+            }
         }
         Ok(Some(dielectric))
     }

@@ -16,15 +16,15 @@ struct FuzzMaterial {
     transforms: array<vec4f, 6>,
 }
 
-@group(1) @binding(21) var<uniform> fuzz_material: FuzzMaterial;
-@group(1) @binding(22) var fuzz_direction_map: texture_2d<f32>;
-@group(1) @binding(23) var fuzz_color_map: texture_2d<f32>;
-@group(1) @binding(24) var fuzz_amount_map: texture_2d<f32>;
-@group(1) @binding(25) var fuzz_direction_sampler: sampler;
-@group(1) @binding(26) var fuzz_color_sampler: sampler;
-@group(1) @binding(27) var fuzz_amount_sampler: sampler;
+@group(1) @binding(19) var<uniform> fuzz_material: FuzzMaterial;
+@group(1) @binding(20) var fuzz_direction_map: texture_2d<f32>;
+@group(1) @binding(21) var fuzz_color_map: texture_2d<f32>;
+@group(1) @binding(22) var fuzz_amount_map: texture_2d<f32>;
+@group(1) @binding(23) var fuzz_direction_sampler: sampler;
+@group(1) @binding(24) var fuzz_color_sampler: sampler;
+@group(1) @binding(25) var fuzz_amount_sampler: sampler;
 // The ambient factor of combed fibres, a layer for each tilt.
-@group(1) @binding(31) var fuzz_table: texture_3d<f32>;
+@group(1) @binding(29) var fuzz_table: texture_3d<f32>;
 
 fn fuzz_uv(in: Varying, texture: u32) -> vec2f {
     let row = fuzz_material.transforms[2u * texture];

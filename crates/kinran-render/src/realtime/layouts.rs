@@ -7,7 +7,7 @@ use kinran_scene::DETAIL_LAYERS_MAX;
 use super::Gpu;
 
 /// Textures of a material, fuzz and skin apart.
-pub(super) const SLOTS: usize = 10;
+pub(super) const SLOTS: usize = 9;
 
 /// Textures of its fuzz.
 pub(super) const FUZZ_SLOTS: usize = 3;
@@ -141,7 +141,6 @@ mod tests {
         "translucency",
         "translucent_color",
         "specular",
-        "specular_color",
     ];
     const FUZZ_SLOT_NAMES: [&str; FUZZ_SLOTS] = ["fuzz_direction", "fuzz_color", "fuzz_amount"];
 

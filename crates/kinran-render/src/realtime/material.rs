@@ -92,8 +92,7 @@ fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTextur
         m.emissive.as_ref().unwrap_or(white),
         translucency.and_then(|t| t.map.as_ref()).unwrap_or(white),
         translucency.and_then(|t| t.color.as_ref()).unwrap_or(white),
-        dielectric.and_then(|d| d.strength_map.as_ref()).unwrap_or(white),
-        dielectric.and_then(|d| d.color.as_ref()).unwrap_or(white),
+        dielectric.and_then(|d| d.map.as_ref()).unwrap_or(white),
     ]
 }
 

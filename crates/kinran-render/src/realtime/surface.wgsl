@@ -20,8 +20,8 @@ struct Material {
     translucency: vec4f,
     // rgb reflectance at normal incidence of what is not metal, w the share that there is of it.
     dielectric: vec4f,
-    // Rows of the ten textures' transforms; w of the first row is the UV set.
-    transforms: array<vec4f, 20>,
+    // Rows of the nine textures' transforms; w of the first row is the UV set.
+    transforms: array<vec4f, 18>,
     // x 0: no skin, else which curvature: 1 zero, 2 mean, 3 directional, 4 normalised; y one over the largest
     // curvature of the tables, z that of the vertices' codes, w roughness of the second lobe of gloss.
     skin: vec4f,
@@ -42,20 +42,18 @@ struct Material {
 @group(1) @binding(7) var translucency_map: texture_2d<f32>;
 @group(1) @binding(8) var translucent_color_map: texture_2d<f32>;
 @group(1) @binding(9) var specular_map: texture_2d<f32>;
-@group(1) @binding(10) var specular_color_map: texture_2d<f32>;
-@group(1) @binding(11) var normal_sampler: sampler;
-@group(1) @binding(12) var aniso_sampler: sampler;
-@group(1) @binding(13) var base_color_sampler: sampler;
-@group(1) @binding(14) var metallic_roughness_sampler: sampler;
-@group(1) @binding(15) var occlusion_sampler: sampler;
-@group(1) @binding(16) var emissive_sampler: sampler;
-@group(1) @binding(17) var translucency_sampler: sampler;
-@group(1) @binding(18) var translucent_color_sampler: sampler;
-@group(1) @binding(19) var specular_sampler: sampler;
-@group(1) @binding(20) var specular_color_sampler: sampler;
-@group(1) @binding(28) var skin_table: texture_2d<f32>;
-@group(1) @binding(29) var skin_ambient_table: texture_2d<f32>;
-@group(1) @binding(30) var skin_penumbra_table: texture_2d<f32>;
+@group(1) @binding(10) var normal_sampler: sampler;
+@group(1) @binding(11) var aniso_sampler: sampler;
+@group(1) @binding(12) var base_color_sampler: sampler;
+@group(1) @binding(13) var metallic_roughness_sampler: sampler;
+@group(1) @binding(14) var occlusion_sampler: sampler;
+@group(1) @binding(15) var emissive_sampler: sampler;
+@group(1) @binding(16) var translucency_sampler: sampler;
+@group(1) @binding(17) var translucent_color_sampler: sampler;
+@group(1) @binding(18) var specular_sampler: sampler;
+@group(1) @binding(26) var skin_table: texture_2d<f32>;
+@group(1) @binding(27) var skin_ambient_table: texture_2d<f32>;
+@group(1) @binding(28) var skin_penumbra_table: texture_2d<f32>;
 
 struct Vertex {
     @location(0) position: vec3f,
@@ -104,8 +102,7 @@ fn surface_at(in: Varying, front: bool) -> Surface {
     let emissive = textureSample(emissive_map, emissive_sampler, uv(in, 5u)).rgb;
     let translucency = textureSample(translucency_map, translucency_sampler, uv(in, 6u)).a;
     let translucent_color = textureSample(translucent_color_map, translucent_color_sampler, uv(in, 7u)).rgb;
-    let strength = textureSample(specular_map, specular_sampler, uv(in, 8u)).a;
-    let specular_color = textureSample(specular_color_map, specular_color_sampler, uv(in, 9u)).rgb;
+    let specular = textureSample(specular_map, specular_sampler, uv(in, 8u));
     let normal_xy = textureSample(normal_map, normal_sampler, uv(in, 0u)).rg * 2.0 - 1.0;
     let texel = textureSample(aniso_map, aniso_sampler, uv(in, 1u)).rgb;
 
@@ -154,8 +151,8 @@ fn surface_at(in: Varying, front: bool) -> Surface {
     surface.alpha_b = clamp(mean / stretch, ALPHA_MIN, 1.0);
     surface.base_color = base.rgb;
     surface.metallic = saturate(material.factors.x * data.z);
-    surface.dielectric = saturate(material.dielectric.rgb * specular_color);
-    surface.strength = saturate(material.dielectric.w * strength);
+    surface.dielectric = saturate(material.dielectric.rgb * specular.rgb);
+    surface.strength = saturate(material.dielectric.w * specular.a);
     surface.transmissive = material.factors.w;
     surface.translucency = saturate(material.translucency.w * translucency);
     surface.translucent_color = material.translucency.rgb * translucent_color;

@@ -1,10 +1,11 @@
 //! A scene as the renderer needs it.
 
 use super::{
-    BoundTexture, FuzzFits, Geometry, MipTexture, RenderDetail, RenderDetailLayer, RenderFuzz, RenderSkin,
+    BoundTexture, FuzzFits, Geometry, MipLevel, MipTexture, RenderDetail, RenderDetailLayer, RenderFuzz,
+    RenderSkin,
 };
 use crate::Error;
-use glam::{Vec3, Vec4};
+use glam::{Vec3, Vec4, Vec4Swizzles, vec2};
 use kinran_image::{Channels, Image, Pixels, Texture, Transfer};
 use kinran_scene::{
     AlphaMode, Detail, DetailMap, Environment, Fuzz, FuzzDirection, FuzzLayer, FuzzPhase, Light, Material,
@@ -64,14 +65,12 @@ pub struct Translucency {
 /// What of a surface reflects that is not metal; see [`kinran_scene::Dielectric`].
 #[derive(Clone, Debug)]
 pub struct RenderDielectric {
-    /// Linear reflectance at normal incidence, multiplied with `color`, then one at most.
+    /// Linear reflectance at normal incidence, multiplied with RGB of `map`, then one at most.
     pub f0: Vec3,
-    /// Linear RGB.
-    pub color: Option<BoundTexture>,
-    /// Share of it all, 0 to 1, multiplied with A of `strength_map`.
+    /// Share of it all, 0 to 1, multiplied with A of `map`.
     pub strength: f32,
-    /// A is a share.
-    pub strength_map: Option<BoundTexture>,
+    /// Linear RGB is a colour, A a share.
+    pub map: Option<BoundTexture>,
 }
 
 /// A material with its textures.
@@ -209,6 +208,41 @@ impl RenderScene {
     }
 }
 
+/// One texture of two that lie on the mesh in one way: RGB of the first, A of the second, white where there is none.
+fn color_and_share(color: Option<BoundTexture>, share: Option<BoundTexture>) -> Option<BoundTexture> {
+    let place = color.as_ref().or(share.as_ref())?.clone();
+    let [color, share] = [color, share].map(|bound| bound.map(|bound| bound.texture));
+    let is_opaque = |texture: &MipTexture| {
+        texture.levels.iter().all(|level| level.texels.iter().all(|texel| texel[3] == 1.0))
+    };
+    if let (Some(color), None) = (&color, &share)
+        && is_opaque(color)
+    {
+        return Some(place);
+    }
+    let size = |texture: &Option<Arc<MipTexture>>| texture.as_ref().map_or(0, |t| t.levels[0].texels.len());
+    let finest = if size(&color) >= size(&share) { &color } else { &share };
+    let levels = &finest.as_ref().unwrap_or(&place.texture).levels;
+    let levels = levels.iter().map(|MipLevel { width, height, .. }| {
+        // Levels of other sizes are enlarged bilinearly.
+        let level = |texture: &MipTexture| {
+            let is_as_large = |level: &MipLevel| level.width <= *width && level.height <= *height;
+            texture.levels.iter().position(is_as_large).unwrap_or(texture.levels.len() - 1)
+        };
+        let texel = |i: u32| {
+            let (x, y) = ((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+            let uv = vec2(x / *width as f32, y / *height as f32);
+            let at = |texture: &Option<Arc<MipTexture>>| {
+                texture.as_ref().map_or(Vec4::ONE, |t| t.sample_level(uv, level(t)))
+            };
+            at(&color).xyz().extend(at(&share).w).to_array()
+        };
+        MipLevel { width: *width, height: *height, texels: (0..width * height).map(texel).collect() }
+    });
+    let texture = MipTexture { levels: levels.collect(), wrap: place.texture.wrap, encoded: None };
+    Some(BoundTexture { texture: Arc::new(texture), ..place })
+}
+
 /// A runtime texture, with the transfer of its slot where its file says none.
 fn said(texture: &Texture, slot: Transfer) -> Cow<'_, Texture> {
     if texture.transfer != Transfer::Unsaid {
@@ -318,9 +352,11 @@ impl TextureLoader<'_> {
             dielectric: match &m.dielectric {
                 Some(d) => Some(RenderDielectric {
                     f0: d.color_factor * d.f0(),
-                    color: load(&d.color, Transfer::Srgb)?,
                     strength: d.strength,
-                    strength_map: load(&d.strength_texture, Transfer::Linear)?,
+                    map: color_and_share(
+                        load(&d.color, Transfer::Srgb)?,
+                        load(&d.strength_texture, Transfer::Linear)?,
+                    ),
                 }),
                 None => None,
             },

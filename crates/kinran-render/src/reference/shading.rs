@@ -64,8 +64,8 @@ fn base_color(material: &RenderMaterial, point: &SurfacePoint, filtering: Textur
 /// Reflectance at normal incidence of what is not metal, and the share that there is of it.
 fn dielectric(material: &RenderMaterial, point: &SurfacePoint, filtering: TextureFiltering) -> (Vec3, f32) {
     let Some(dielectric) = &material.dielectric else { return (Vec3::splat(DIELECTRIC_F0), 1.0) };
-    let f0 = dielectric.f0 * sample(&dielectric.color, point, filtering).xyz();
-    let strength = dielectric.strength * sample(&dielectric.strength_map, point, filtering).w;
+    let map = sample(&dielectric.map, point, filtering);
+    let (f0, strength) = (dielectric.f0 * map.xyz(), dielectric.strength * map.w);
     (f0.clamp(Vec3::ZERO, Vec3::ONE), strength.clamp(0.0, 1.0))
 }
 
