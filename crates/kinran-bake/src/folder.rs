@@ -150,6 +150,30 @@ pub enum FolderError {
     },
 }
 
+impl FolderError {
+    /// What kind of error it is, in the words of [`kinran_image::Error::code`]; `input` for what is no folder, `option`, and
+    /// `maps` for maps that cannot be understood.
+    pub fn code(&self) -> &'static str {
+        match self {
+            FolderError::Image(error) => error.code(),
+            FolderError::NotAFolder(_) => "input",
+            FolderError::Flag { .. } => "option",
+            FolderError::NoMaps { .. } | FolderError::Ambiguous { .. } | FolderError::Unfit { .. } => "maps",
+        }
+    }
+
+    /// The file or folder that it is about.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            FolderError::Image(error) => error.file(),
+            FolderError::NotAFolder(path)
+            | FolderError::NoMaps { folder: path, .. }
+            | FolderError::Unfit { path, .. } => Some(path),
+            FolderError::Ambiguous { .. } | FolderError::Flag { .. } => None,
+        }
+    }
+}
+
 /// Names for an error message: the first twelve, and how many more there are.
 fn listed(names: &[String]) -> String {
     if names.is_empty() {
@@ -666,7 +690,18 @@ fn leave_out_baked(listing: &mut Listing) {
 /// # Errors
 /// [`FolderError::NotAFolder`], or the folder cannot be read.
 pub fn named_maps(folder: &Path) -> Result<Vec<(PathBuf, Role, Option<Green>)>, FolderError> {
-    let found = list(&Disk, folder)?.found.into_iter().filter(|file| !file.unread);
+    named_maps_in(&Disk, folder)
+}
+
+/// As [`named_maps`], of a folder that may be elsewhere than on a disk.
+///
+/// # Errors
+/// As [`named_maps`].
+pub fn named_maps_in(
+    files: &dyn Files,
+    folder: &Path,
+) -> Result<Vec<(PathBuf, Role, Option<Green>)>, FolderError> {
+    let found = list(files, folder)?.found.into_iter().filter(|file| !file.unread);
     Ok(found.filter_map(|file| Some((file.path, file.role?, file.name.green))).collect())
 }
 

@@ -25,7 +25,7 @@ use crate::values::{CONTAINERS, Choices, FORMATS, PRESETS, SWITCH, choice, exr_l
 use crate::{Console, Error};
 
 pub use curvature::CurvatureArgs;
-pub use library::{CACHE_LIMIT, LibraryArgs, LibraryReport, bake_library, cache_folder};
+pub use library::{LibraryArgs, LibraryReport, bake_library, cache_folder};
 
 /// Bakes a folder of authored maps, a glTF file or a whole library into textures with right mips
 ///
@@ -185,10 +185,6 @@ pub struct Args {
     /// Flags that only a manifest takes.
     #[command(flatten)]
     pub library: LibraryArgs,
-
-    /// The input is a library's copy, whose place says nothing.
-    #[arg(skip)]
-    pub is_copy: bool,
 }
 
 /// `ROLE=FILE`.
@@ -287,19 +283,19 @@ impl Args {
     }
 
     /// How a glTF file is baked.
-    fn gltf_options(&self) -> Result<GltfOptions, Error> {
+    fn gltf_options(&self) -> GltfOptions {
         let mut how = GltfOptions::default();
         (how.textures, how.green, how.source) = (self.textures(), self.green(), self.source());
         how.form = self.form.unwrap_or(how.form);
         (how.all_textures, how.estimate_normals) = (self.all_textures, self.curvature.estimate_normals);
-        how.allow_outside = self.model.allowed()?.to_vec();
+        how.allow_outside.clone_from(&self.model.allow_outside);
         (how.skin, how.curvature) = (self.curvature.skin.clone(), self.curvature.options());
-        Ok(how)
+        how
     }
 
     /// What reports name as their source.
     fn source(&self) -> Option<String> {
-        way(self.output(), &self.input).filter(|_| !self.is_copy)
+        way(self.output(), &self.input)
     }
 
     fn green(&self) -> Option<Green> {
@@ -386,9 +382,4 @@ fn with_a_way(error: Error, console: &Console) -> Error {
         }
         _ => error,
     }
-}
-
-/// The last component of a path, as text.
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }

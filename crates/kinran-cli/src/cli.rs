@@ -190,8 +190,8 @@ fn do_command(command: &Command, console: &Console) -> Result<(), Error> {
         Command::Shaders(args) => shaders::run(args, console),
         Command::Skin(args) => skin_sheet::run(args, console).map_err(|e| e.about(&args.file)),
         Command::SkinLut(args) => skin_lut::run(args, console),
-        Command::Completions(args) => completions::run(args, console),
-        Command::Man(args) => completions::run_man(args, console),
+        Command::Completions(args) => completions::run(args, self::command(), console),
+        Command::Man(args) => completions::run_man(args, self::command(), console),
     }
 }
 

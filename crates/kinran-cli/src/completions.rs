@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::Command;
 use clap_complete::Shell;
 use clap_mangen::Man;
 use kinran_image::write_atomically;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::{Console, Error, cli, outputs};
+use crate::{Console, Error, outputs};
 
 /// Prints what a shell needs to complete commands and flags
 #[derive(Debug, clap::Args)]
@@ -44,28 +45,27 @@ pub(crate) struct Report {
     text: Option<String>,
 }
 
-/// `kinran completions`.
+/// `kinran completions` of a program.
 ///
 /// # Errors
 /// Those of standard output.
-pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
+pub fn run(args: &Args, mut program: Command, console: &Console) -> Result<(), Error> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut cli::command(), "kinran", &mut script);
+    clap_complete::generate(args.shell, &mut program, "kinran", &mut script);
     print(script, console)
 }
 
-/// `kinran man`.
+/// `kinran man` of a program.
 ///
 /// # Errors
 /// Those of the folder and of standard output.
-pub fn run_man(args: &ManArgs, console: &Console) -> Result<(), Error> {
-    let mut command = cli::command();
-    command.build();
-    let Some(folder) = &args.output else { return print(page(&Man::new(command))?, console) };
+pub fn run_man(args: &ManArgs, mut program: Command, console: &Console) -> Result<(), Error> {
+    program.build();
+    let Some(folder) = &args.output else { return print(page(&Man::new(program))?, console) };
     outputs::check_folder(folder)?;
     kinran_image::make_folder(folder)?;
     let mut files = Vec::new();
-    write_pages(&command, folder, &mut files)?;
+    write_pages(&program, folder, &mut files)?;
     let text = format!("{} pages are in {}", files.len(), folder.display());
     console.result(&Report { files, text: None }, &text)
 }
@@ -84,7 +84,7 @@ fn page(man: &Man) -> Result<Vec<u8>, Error> {
 }
 
 /// The page of a command and those of the commands in it.
-fn write_pages(command: &clap::Command, folder: &Path, files: &mut Vec<String>) -> Result<(), Error> {
+fn write_pages(command: &Command, folder: &Path, files: &mut Vec<String>) -> Result<(), Error> {
     let man = Man::new(command.clone());
     let file = man.get_filename();
     write_atomically(&folder.join(&file), &page(&man)?)?;

@@ -2,7 +2,6 @@ use std::path::{Path, PathBuf};
 
 use kinran_image::Cancelled;
 
-use crate::Failure;
 use crate::values::counted;
 
 /// Why a command failed. The message is one line: what is wrong where, and what to do about it.
@@ -70,9 +69,6 @@ pub enum Error {
         /// What went wrong.
         error: Box<Error>,
     },
-    /// What went wrong with a copy of files, told as of the files themselves.
-    #[error("{}", .0.message)]
-    Retold(Box<Failure>),
     /// Standard output could not be written.
     #[error("standard output: {}; send it elsewhere", kinran_image::io_reason(.0))]
     Stdout(#[from] std::io::Error),
@@ -101,11 +97,19 @@ impl From<kinran::Error> for Error {
             Task::Image(error) => error.into(),
             Task::Scene(error) => error.into(),
             Task::Folder(error) => error.into(),
-            Task::Option { option, given, file: Some(file), reason } => {
-                Error::flag_error_of(file, format!("--{option} {given}"), reason)
+            Task::Option { option, given, file, reason } => {
+                let given = format!("--{option} {given}");
+                match file {
+                    Some(file) => Error::flag_error_of(file, given.trim_end(), reason),
+                    None => Error::flag_error(given.trim_end(), reason),
+                }
             }
-            Task::Option { option, given, file: None, reason } => {
-                Error::flag_error(format!("--{option} {given}"), reason)
+            Task::Manifest(error) => error.into(),
+            Task::Input { path, fault } => Error::file_error(path, fault.to_string()),
+            Task::UnknownContent { file, name } => {
+                let reason =
+                    format!("key KinranMap: \"{name}\" is no map that is known; say --role what it is");
+                kinran_image::Error::malformed(file, reason).into()
             }
             Task::OverInput { input } => Error::file_error(
                 input,
@@ -198,35 +202,17 @@ impl Error {
     /// that is not known; `maps` a folder of maps that cannot be understood; `manifest`; `entries` of a manifest failed; `findings` of `inspect --check`;
     /// `render`; `gpu`; `shader`; `cancelled` work that was stopped; `internal` a defect of the program.
     pub fn code(&self) -> &'static str {
-        use kinran_bake::folder::FolderError;
         use kinran_render::Error as RenderError;
-        fn of_image(error: &kinran_image::Error) -> &'static str {
-            match error {
-                kinran_image::Error::Io { .. } => "io",
-                kinran_image::Error::Malformed { .. } => "malformed",
-                kinran_image::Error::Unsupported(_) => "unsupported",
-                kinran_image::Error::Cancelled(_) => "cancelled",
-            }
-        }
         match self {
             Error::About { error, .. } => error.code(),
-            Error::Retold(failure) => failure.code,
-            Error::Usage(_) | Error::Flag { .. } | Error::Folder(FolderError::Flag { .. }) => "usage",
-            Error::Render(RenderError::Setting { .. }) => "usage",
-            Error::File { .. } | Error::Folder(FolderError::NotAFolder(_)) => "input",
-            Error::Scene(kinran_scene::Error::Outside { .. }) => "input",
-            Error::Image(error)
-            | Error::Folder(FolderError::Image(error))
-            | Error::Scene(kinran_scene::Error::Image(error)) => of_image(error),
-            Error::Scene(kinran_scene::Error::Cancelled(_)) | Error::Render(RenderError::Cancelled(_)) => {
-                "cancelled"
-            }
-            Error::Scene(kinran_scene::Error::Io { .. } | kinran_scene::Error::Unreadable { .. })
-            | Error::Stdout(_) => "io",
-            Error::Scene(kinran_scene::Error::Malformed { .. }) => "malformed",
-            Error::Scene(kinran_scene::Error::Unsupported { .. }) => "unsupported",
-            Error::Folder(_) => "maps",
-            Error::Cancelled(_) => "cancelled",
+            Error::Usage(_) | Error::Flag { .. } | Error::Render(RenderError::Setting { .. }) => "usage",
+            Error::File { .. } => "input",
+            Error::Image(error) => error.code(),
+            Error::Scene(error) => error.code(),
+            Error::Folder(error) if error.code() == "option" => "usage",
+            Error::Folder(error) => error.code(),
+            Error::Cancelled(_) | Error::Render(RenderError::Cancelled(_)) => "cancelled",
+            Error::Stdout(_) => "io",
             Error::Manifest(_) => "manifest",
             Error::Entries { .. } => "entries",
             Error::Findings { .. } => "findings",
@@ -239,31 +225,12 @@ impl Error {
 
     /// The file or folder that it is about.
     pub fn file(&self) -> Option<&Path> {
-        use kinran_bake::folder::FolderError;
         match self {
             Error::File { path, .. } | Error::About { path, .. } | Error::Findings { path, .. } => Some(path),
             Error::Flag { file, .. } => file.as_deref(),
-            Error::Retold(failure) => failure.file.as_deref(),
-            Error::Image(error)
-            | Error::Folder(FolderError::Image(error))
-            | Error::Scene(kinran_scene::Error::Image(error)) => match error {
-                kinran_image::Error::Io { path, .. } | kinran_image::Error::Malformed { path, .. } => {
-                    Some(path)
-                }
-                kinran_image::Error::Unsupported(_) | kinran_image::Error::Cancelled(_) => None,
-            },
-            Error::Scene(
-                kinran_scene::Error::Io { path, .. }
-                | kinran_scene::Error::Malformed { path, .. }
-                | kinran_scene::Error::Unsupported { path, .. }
-                | kinran_scene::Error::Unreadable { path, .. }
-                | kinran_scene::Error::Outside { path, .. },
-            ) => Some(path),
-            Error::Folder(
-                FolderError::NotAFolder(path)
-                | FolderError::NoMaps { folder: path, .. }
-                | FolderError::Unfit { path, .. },
-            ) => Some(path),
+            Error::Image(error) => error.file(),
+            Error::Scene(error) => error.file(),
+            Error::Folder(error) => error.file(),
             Error::Manifest(error) => Some(&error.path),
             _ => None,
         }
@@ -276,7 +243,6 @@ impl Error {
             Error::Flag { flag, .. } => Some(flag.clone()),
             Error::Folder(FolderError::Flag { flag, .. }) => Some(flag_of(flag)),
             Error::About { error, .. } => error.flag(),
-            Error::Retold(failure) => failure.flag.clone(),
             _ => None,
         }
     }
@@ -285,7 +251,6 @@ impl Error {
     pub fn line_and_column(&self) -> Option<(usize, usize)> {
         match self {
             Error::About { error, .. } => error.line_and_column(),
-            Error::Retold(failure) => failure.line.zip(failure.column),
             Error::Manifest(error) => Some((error.line, error.column)),
             _ => None,
         }
@@ -295,7 +260,6 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::About { error, .. } => error.exit_code(),
-            Error::Retold(failure) => failure.exit_code,
             Error::Internal(_) | Error::Render(kinran_render::Error::SizeMismatch { .. }) => 1,
             _ if self.code() == "cancelled" => 130,
             _ => 2,

@@ -5,7 +5,7 @@ mod fuzz_plots;
 
 use crate::{Console, Error};
 
-pub use fuzz::{FuzzArgs, FuzzLanguage, FuzzReport, PhaseName};
+pub use fuzz::{FuzzArgs, FuzzLanguage};
 
 /// Fits what shaders approximate, and tells how far off it is
 #[derive(Debug, clap::Args)]

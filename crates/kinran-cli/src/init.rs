@@ -10,10 +10,10 @@ use kinran_scene::Document;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::detail::KindName;
 use crate::outputs::has_extension;
 use crate::values::counted;
 use crate::{Console, Error, Progress, Stage};
+use kinran::detail::{MapKind, kind_of_role};
 
 /// Writes a kinran.toml that lists what a folder holds, for `kinran bake kinran.toml`
 ///
@@ -408,7 +408,7 @@ impl Found {
             let all_tiles = maps(&tiles);
             for (target, role) in maps(&targets) {
                 // What is packed is solved only where somebody says so.
-                let kind = KindName::of_role(role).filter(|_| !role.is_packed()).map(KindName::name);
+                let kind = kind_of_role(role).filter(|_| !role.is_packed()).map(MapKind::name);
                 let Some(kind) = kind else { continue };
                 let stem =
                     |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();

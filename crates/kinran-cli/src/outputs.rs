@@ -7,13 +7,17 @@ use std::path::{Path, PathBuf};
 
 use kinran::report::{KnownFiles, WrittenFile};
 use kinran::{OutputFolder, Sink, Space};
-use kinran_scene::Packed;
 
 use crate::{Console, Error};
 
 /// Whether a path ends in `.extension`, in any case.
 pub(crate) fn has_extension(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}
+
+/// A file's name without its folder, as it stands in reports.
+pub(crate) fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// `name` in the folder that the input is in: where files go that nobody names a place for.
@@ -117,21 +121,6 @@ pub(crate) fn refuse_other_page(page: &Path) -> Result<(), Error> {
     Err(Error::file_error(page, "is a page that kinran did not write; name another folder with --output"))
 }
 
-/// A path from a folder, `/`-separated.
-pub(crate) fn relative(folder: &Path, path: &Path) -> String {
-    let path = path.strip_prefix(folder).unwrap_or(path);
-    path.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
-}
-
-/// Of what a document takes along, the files that would change what is there, and the document itself.
-pub(crate) fn changed_files(folder: &Path, packed: &Packed) -> Vec<String> {
-    let last = packed.files.len().saturating_sub(1);
-    let files = packed.files.iter().enumerate();
-    let changed = files
-        .filter(|(i, (path, bytes))| *i == last || std::fs::read(path).is_ok_and(|there| there != *bytes));
-    changed.map(|(_, (path, _))| relative(folder, path)).collect()
-}
-
 /// What is known of a file that was just written to `folder`.
 ///
 /// # Errors
@@ -149,21 +138,28 @@ pub(crate) fn written_file(folder: &Path, file: impl Into<String>) -> Result<Wri
 
 /// Where a bake's files go: a folder in which nothing of a person's is overwritten.
 pub(crate) struct Output<'a> {
-    pub(crate) folder: &'a Path,
-    /// What is baked.
-    pub(crate) input: &'a Path,
-    /// Files that kinran did not write are overwritten all the same.
-    pub(crate) force: bool,
-    /// Is told where room may be short.
-    pub(crate) console: &'a Console,
+    folder: OutputFolder,
+    input: &'a Path,
+    force: bool,
+    console: &'a Console,
+}
+
+impl<'a> Output<'a> {
+    /// For what is made of `input`; with `force` files that kinran did not write are overwritten all the same. The console is
+    /// told where room may be short.
+    pub(crate) fn new(folder: &Path, input: &'a Path, force: bool, console: &'a Console) -> Self {
+        Output { folder: OutputFolder::new(folder), input, force, console }
+    }
 }
 
 impl Sink for Output<'_> {
     fn expect(&self, names: &[String], space: Space) -> Result<(), kinran::Error> {
         let checked = || {
-            refuse_other_source(self.folder, names, self.input, self.force)?;
-            refuse_foreign(self.folder, names, self.force)?;
-            check_space(self.folder, space.beyond(replaced_bytes(self.folder, names)))
+            let folder = &self.folder.path;
+            refuse_other_source(folder, names, self.input, self.force)?;
+            refuse_foreign(folder, names, self.force)?;
+            // What is there stays until all is finished.
+            check_space(folder, space)
         };
         match checked() {
             Err(error) => Err(kinran::Error::Refused(Box::new(error))),
@@ -175,15 +171,19 @@ impl Sink for Output<'_> {
     }
 
     fn put(&self, name: &str, bytes: &[u8]) -> Result<(), kinran::Error> {
-        OutputFolder::new(self.folder).put(name, bytes)
+        self.folder.put(name, bytes)
+    }
+
+    fn finish(&self) -> Result<(), kinran::Error> {
+        self.folder.finish()
     }
 
     fn get(&self, name: &str) -> Option<Vec<u8>> {
-        OutputFolder::new(self.folder).get(name)
+        self.folder.get(name)
     }
 
     fn place(&self, name: &str) -> Option<PathBuf> {
-        OutputFolder::new(self.folder).place(name)
+        self.folder.place(name)
     }
 
     fn is_on_disk(&self) -> bool {
@@ -313,11 +313,6 @@ pub(crate) fn space_text(space: Space) -> String {
         (least, most) if least == most => most,
         (least, most) => format!("{least} to {most}"),
     }
-}
-
-/// Bytes of those of `files` that are there already, in `folder`, and make room for the new ones.
-pub(crate) fn replaced_bytes(folder: &Path, files: &[String]) -> u64 {
-    files.iter().filter_map(|file| Some(std::fs::metadata(folder.join(file)).ok()?.len())).sum()
 }
 
 /// Refuses output for which the disk of `folder` has clearly no room. The sentence that it may give is a warning: it

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
 use glam::{Vec2, vec2};
+use kinran_image::{Channels, Image, Pixels, encode_png};
 
 use crate::Error;
 use crate::render::write_rgb8;
@@ -184,6 +185,15 @@ impl Picture {
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let pixels = pixels.map(|(x, y)| self.pixels[row(y) + from(x, width, self.width)]).collect();
         Picture { width, height, pixels }
+    }
+
+    /// The bytes of a PNG.
+    ///
+    /// # Errors
+    /// Those of [`kinran_image::encode_png`].
+    pub fn encode(&self) -> Result<Vec<u8>, kinran_image::Error> {
+        let pixels = Pixels::U8(self.pixels.as_flattened().to_vec());
+        encode_png(&Image::new(self.width, self.height, Channels::Rgb, pixels)?)
     }
 
     /// Writes a PNG, whole or not at all.

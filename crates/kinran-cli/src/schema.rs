@@ -6,8 +6,7 @@ use serde_json::Value;
 
 use crate::bake::{LibraryReport, report::BakeReport};
 use crate::{
-    cache, compare, completions, console, demo, detail, fit, fuzz_sheet, init, inspect, render, shaders,
-    skin_sheet,
+    cache, compare, completions, console, demo, fuzz_sheet, init, inspect, render, shaders, skin_sheet,
 };
 
 /// A schema for each command, by its name; `error` is that of what any of them prints in the place of a result.
@@ -19,10 +18,10 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
         of::<compare::Report>("compare", "kinran compare"),
         of::<completions::Report>("completions", "kinran completions, kinran man"),
         of::<demo::Summary>("demo", "kinran demo"),
-        of::<detail::LibraryReport>("detail-report", "kinran detail report"),
-        of::<detail::SolveReport>("detail-solve", "kinran detail solve"),
+        of::<kinran::detail::StudyReport>("detail-report", "kinran detail report"),
+        of::<kinran::detail::SolveReport>("detail-solve", "kinran detail solve"),
         of::<console::Failed>("error", "any command that fails"),
-        of::<fit::FuzzReport>("fit-fuzz", "kinran fit fuzz"),
+        of::<kinran::fit::FuzzReport>("fit-fuzz", "kinran fit fuzz"),
         of::<fuzz_sheet::Summary>("fuzz", "kinran fuzz"),
         of::<init::Report>("init", "kinran init"),
         of::<inspect::Report>("inspect", "kinran inspect"),

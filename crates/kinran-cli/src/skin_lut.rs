@@ -1,19 +1,15 @@
 //! `kinran skin-lut`: the tables of pre-integrated skin.
 
 pub(crate) mod plot;
-mod profile_file;
 
 use std::path::{Path, PathBuf};
 
-use kinran::Space;
+use kinran::Disk;
 use kinran::options::Container;
-use kinran::skin::{TableOptions, tables};
-use kinran_bake::skin_lut::{Profile, TableFormat};
-use kinran_shading::skin::profile::ProfileError;
+use kinran::skin::{ProfileSource, TableOptions, Tables, tables};
+use kinran_bake::skin_lut::TableFormat;
 
-use crate::outputs::{
-    Output, beside, check_folder, kept_remark, refuse_foreign, refuse_input, tell_place, written_file,
-};
+use crate::outputs::{Output, beside, check_folder, kept_remark, tell_place};
 use crate::progress::Bars;
 use crate::values::{CONTAINERS, Choices, choice, number, size};
 use crate::{Console, Error};
@@ -110,9 +106,15 @@ impl Args {
     }
 
     /// What the flags say.
-    fn options(&self) -> TableOptions {
+    pub(crate) fn options(&self) -> TableOptions {
         let mut how = TableOptions::default();
         how.name.clone_from(&self.name);
+        how.profile = match (&self.profile, self.burley, self.mean_free_path, self.albedo) {
+            (_, Some(d), ..) => ProfileSource::Burley(d),
+            (_, _, Some(path), Some(albedo)) => ProfileSource::MeanFreePath { path, albedo },
+            (Some(file), ..) => ProfileSource::File(file.clone()),
+            _ => ProfileSource::HumanSkin,
+        };
         (how.size, how.range, how.scale, how.penumbra) = (self.size, self.range, self.scale, self.penumbra);
         (how.format, how.container) = (self.format, self.container);
         how
@@ -134,9 +136,10 @@ fn table_size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-/// Bytes that the tables will take.
-pub(crate) fn space(args: &Args) -> Space {
-    args.options().plan().1
+/// Draws tables as a PNG.
+pub(crate) fn draw(tables: &Tables) -> Result<Vec<u8>, kinran::Error> {
+    let title = format!("{}, {}", tables.name, tables.profile);
+    Ok(plot::plot(&title, &tables.punctual, &tables.ambient, tables.range).encode()?)
 }
 
 /// Runs the command.
@@ -144,35 +147,14 @@ pub(crate) fn space(args: &Args) -> Space {
 /// # Errors
 /// Whatever is wrong with the profile, the flags or the output folder.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    args.options().check()?;
-    let (profile, described) = profile(args)?;
-    let refuse = |error: ProfileError| match &args.profile {
-        Some(file) => Error::file_error(file, error.to_string()),
-        None => Error::flag_error(profile_flag(args), error),
-    };
-    profile.radial().map_err(refuse)?;
     let (output, how) = (args.output(), args.options());
+    how.check()?;
+    how.profile.read(&Disk)?;
     check_folder(&output)?;
-    let plot_file = format!("{}.png", args.name);
-    let (tables_files, _) = how.plan();
-    for file in tables_files.iter().chain([&plot_file, &how.report()]) {
-        refuse_input(&output.join(file), args.profile.as_deref())?;
-    }
-    let out = Output {
-        folder: &output,
-        input: args.profile.as_deref().unwrap_or(Path::new("")),
-        force: args.force,
-        console,
-    };
-    // The plot lies beside the tables, and the report tells whose it is.
-    refuse_foreign(&output, &[how.report(), plot_file.clone()], args.force)?;
-
+    let input = args.profile.as_deref().unwrap_or(Path::new(""));
+    let out = Output::new(&output, input, args.force, console);
     let bars = Bars::new(console.progress());
-    let mut made = tables(&profile, &described, &how, &out, bars.task())?;
-    let title = format!("{}, {}", args.name, made.report.profile);
-    plot::plot(&title, &made.punctual, &made.ambient, args.range).write(&output.join(&plot_file))?;
-    made.write_report(&how, vec![written_file(&output, plot_file)?], &out)?;
-    let report = made.report;
+    let report = tables(&Disk, &how, Some(&draw), &out, bars.task())?;
 
     let mut lines = String::new();
     for table in &report.tables {
@@ -188,38 +170,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
             table.encoding_error
         );
     }
-    lines += &format!("{}\n", output.join(format!("{}.png", args.name)).display());
+    lines += &format!("{}\n", output.join(how.plot()).display());
     lines += &kept_remark(&report.kept);
     console.result(&report, &lines)?;
     tell_place(console, args.output.as_deref(), &output);
     Ok(())
-}
-
-/// The flag that decides about a profile that no file gives.
-fn profile_flag(args: &Args) -> &'static str {
-    match (args.burley, args.mean_free_path) {
-        (Some(_), _) => "--burley",
-        (_, Some(_)) => "--mean-free-path",
-        _ => "--scale",
-    }
-}
-
-/// The profile that the flags name, and what it is called; `--scale` is for who makes tables of it.
-fn profile(args: &Args) -> Result<(Profile, String), Error> {
-    let list = |d: [f64; 3]| format!("{}, {}, {}", d[0], d[1], d[2]);
-    if let Some(d) = args.burley {
-        return Ok((Profile::Burley(d), format!("Burley, d = {} mm", list(d))));
-    }
-    if let (Some(path), Some(albedo)) = (args.mean_free_path, args.albedo) {
-        let described = format!("Burley, mean free path {} mm, albedo {}", list(path), list(albedo));
-        return Ok((Profile::MeanFreePath { path, albedo }, described));
-    }
-    Ok(match &args.profile {
-        Some(file) => (profile_file::read(file)?, file_name(file)),
-        None => (Profile::default(), "human skin, six Gaussians".to_owned()),
-    })
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }

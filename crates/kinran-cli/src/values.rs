@@ -1,6 +1,6 @@
 //! What people type as flags.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Vec3;
@@ -49,20 +49,6 @@ pub(crate) fn exr_layer(text: &str) -> Result<(PathBuf, String), String> {
     }
 }
 
-/// The layer that flags name for a file, which they call by its path, from here or from `folder`, or by its name.
-pub(crate) fn exr_layer_of<'a>(
-    layers: &'a [(PathBuf, String)],
-    file: &Path,
-    folder: &Path,
-) -> Option<&'a str> {
-    let is_it = |path: &PathBuf| {
-        file == path
-            || file == folder.join(path)
-            || file.file_name().is_some_and(|name| path == Path::new(name))
-    };
-    layers.iter().rev().find(|(path, _)| is_it(path)).map(|(_, layer)| layer.as_str())
-}
-
 /// "1 file", "2 files".
 pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
@@ -74,11 +60,6 @@ pub(crate) fn range_in_words(message: &str) -> String {
         Some((head, range)) => format!("{head} is not from {}", range.replacen("..=", " to ", 1)),
         None => message.to_owned(),
     }
-}
-
-/// Names, one after the other, as messages list them.
-pub(crate) fn list(names: &[String]) -> String {
-    if names.is_empty() { "none".into() } else { names.join(", ") }
 }
 
 /// What can be chosen: each value with the word for it and what help says of it.

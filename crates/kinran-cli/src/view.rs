@@ -17,6 +17,8 @@ use crate::surfaces::fuzz_fits;
 use crate::values::{direction, number, size, vector};
 use crate::{Error, Progress};
 
+pub(crate) use crate::outputs::file_name;
+
 /// Flags for camera, light and display that commands share.
 #[derive(Args, Clone, Debug)]
 pub struct ViewArgs {
@@ -526,9 +528,4 @@ fn turned(environment: Environment, degrees: f32) -> Environment {
         Environment::from_fn(environment.height(), |direction| environment.radiance(back * direction));
     turned.notes = environment.notes;
     turned
-}
-
-/// A file's name without its folder, as it stands in reports.
-pub(crate) fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }

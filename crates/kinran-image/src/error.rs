@@ -31,6 +31,25 @@ pub enum Error {
 }
 
 impl Error {
+    /// What kind of error it is, in a word that stays the same: `io` the system refused; `malformed` a damaged file;
+    /// `unsupported` a sound one with something that is not known; `cancelled`.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Error::Io { .. } => "io",
+            Error::Malformed { .. } => "malformed",
+            Error::Unsupported(_) => "unsupported",
+            Error::Cancelled(_) => "cancelled",
+        }
+    }
+
+    /// The file that it is about.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Error::Io { path, .. } | Error::Malformed { path, .. } => Some(path),
+            Error::Unsupported(_) | Error::Cancelled(_) => None,
+        }
+    }
+
     /// An [`Error::Malformed`] about `path`.
     pub fn malformed(path: impl AsRef<Path>, reason: impl Into<String>) -> Self {
         Error::Malformed { path: path.as_ref().to_path_buf(), reason: reason.into() }

@@ -55,6 +55,6 @@ pub use texture_file::{decode_texture, read_texture, write_texture};
 pub use tick::{Cancelled, Tick, untold};
 pub use unfinished::{Unfinished, make_folder, remove_empty_folders, remove_unfinished};
 pub use write::{
-    encode_exr_planes, encode_png, is_temporary, write_atomically, write_atomically_in,
+    Staging, encode_exr_planes, encode_png, is_temporary, write_atomically, write_atomically_in,
     write_atomically_with, write_exr, write_exr_planes, write_png,
 };

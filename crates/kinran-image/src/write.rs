@@ -12,9 +12,9 @@ use exr::prelude::{
 };
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempDir};
 
-use crate::{Channels, Error, Image, Pixels, Unfinished};
+use crate::{Channels, Error, Image, Pixels, Unfinished, make_folder};
 
 /// Writes a file by a temporary one in the same folder, flushed to disk and renamed: whatever happens,
 /// `path` holds its old content or all of the new. No temporary file stays behind, but where the process is killed:
@@ -101,7 +101,7 @@ fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
 /// Folders that were looked through for abandoned files.
 static LOOKED_THROUGH: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// Removes temporary files that nobody is at work on any more; of every folder once.
+/// Removes temporary files and folders that nobody is at work on any more; of every folder once.
 fn remove_abandoned(folder: &Path) {
     let mut looked_through = LOOKED_THROUGH.lock().unwrap_or_else(PoisonError::into_inner);
     if !looked_through.insert(folder.to_path_buf()) {
@@ -109,14 +109,98 @@ fn remove_abandoned(folder: &Path) {
     }
     // What cannot be looked at or removed is none of the caller's troubles.
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
-        if !is_file || !entry.file_name().to_str().is_some_and(is_temporary) {
+        if !entry.file_name().to_str().is_some_and(is_temporary) {
             continue;
         }
-        let Ok(file) = File::options().write(true).open(entry.path()) else { continue };
-        if file.try_lock().is_ok() {
-            let _ = fs::remove_file(entry.path());
+        let (path, kind) = (entry.path(), entry.file_type());
+        let is_free =
+            |lock: &Path| File::options().write(true).open(lock).is_ok_and(|file| file.try_lock().is_ok());
+        match kind {
+            Ok(kind) if kind.is_file() && is_free(&path) => drop(fs::remove_file(path)),
+            Ok(kind) if kind.is_dir() && is_free(&path.join(LOCK)) => drop(fs::remove_dir_all(path)),
+            _ => {}
         }
+    }
+}
+
+/// The file in a [`Staging`] that is locked as long as somebody is at work there.
+const LOCK: &str = "lock";
+
+/// Files of one piece of work, which appear when all of them are there: until [`Staging::publish`] they lie in a folder of
+/// their own, which goes with this value. If the process is killed, the next one that writes into the folder removes it.
+#[derive(Debug)]
+pub struct Staging {
+    folder: PathBuf,
+    /// Paths from the folder, in the order in which the files came.
+    files: Vec<PathBuf>,
+    _lock: File,
+    work: TempDir,
+    _unfinished: Unfinished,
+}
+
+impl Staging {
+    /// Begins a piece of work whose files go to a folder, which is made.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the folder.
+    pub fn new(folder: &Path) -> Result<Staging, Error> {
+        let fail = |e: io::Error| Error::io(folder, e.kind().into());
+        make_folder(folder)?;
+        remove_abandoned(folder);
+        let (prefix, length, suffix) = TEMPORARY;
+        let make =
+            || tempfile::Builder::new().prefix(prefix).rand_bytes(length).suffix(suffix).tempdir_in(folder);
+        loop {
+            let (unfinished, work) = Unfinished::make(make).map_err(fail)?;
+            let lock = File::create(work.path().join(LOCK)).map_err(fail)?;
+            let _ = lock.lock();
+            // Before it was locked somebody may have taken it for abandoned.
+            if work.path().join(LOCK).exists() {
+                let folder = folder.to_path_buf();
+                return Ok(Staging { folder, files: Vec::new(), _lock: lock, work, _unfinished: unfinished });
+            }
+        }
+    }
+
+    /// Takes a file, flushed to disk; `name` is its path from the folder, without `..`. One of that name is replaced.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the file as it will be: there is a folder in its place, the disk is full.
+    pub fn put(&mut self, name: &Path, bytes: &[u8]) -> Result<(), Error> {
+        let path = self.folder.join(name);
+        let fail = |e| Error::io(&path, e);
+        if path.is_dir() {
+            return Err(fail(io::ErrorKind::IsADirectory.into()));
+        }
+        let staged = self.place(name);
+        fs::create_dir_all(staged.parent().unwrap_or(&self.folder)).map_err(fail)?;
+        let mut file = File::create(&staged).map_err(fail)?;
+        file.write_all(bytes).and_then(|()| file.sync_all()).map_err(fail)?;
+        self.files.retain(|known| known != name);
+        self.files.push(name.to_path_buf());
+        Ok(())
+    }
+
+    /// Where a file lies that was taken; `None` of others.
+    pub fn find(&self, name: &Path) -> Option<PathBuf> {
+        self.files.iter().any(|known| known == name).then(|| self.place(name))
+    }
+
+    fn place(&self, name: &Path) -> PathBuf {
+        self.work.path().join("files").join(name)
+    }
+
+    /// Moves the files to where they belong, in the order in which they came, each by a rename.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming a file that cannot be moved; those before it are.
+    pub fn publish(self) -> Result<(), Error> {
+        for name in &self.files {
+            let path = self.folder.join(name);
+            make_folder(path.parent().unwrap_or(&self.folder))?;
+            fs::rename(self.place(name), &path).map_err(|e| Error::io(&path, e))?;
+        }
+        Ok(())
     }
 }
 

@@ -110,6 +110,14 @@ pub(crate) fn split<'a>(name: &Path, bytes: &'a [u8]) -> Result<Container<'a>, E
     Ok(Container::new(json, bin, others))
 }
 
+/// A GLB of a document's JSON and the bytes of its first buffer.
+///
+/// # Errors
+/// [`Error::Unsupported`] where it would have four GiB or more.
+pub fn glb(json: &[u8], binary: &[u8]) -> Result<Vec<u8>, Error> {
+    join(Path::new("the model"), json, binary, &[])
+}
+
 /// A GLB of a JSON chunk, a binary one (none when `bin` is empty) and others, each padded to four bytes: JSON with spaces,
 /// the others with zeros (glTF 2.0 section 4.4.3).
 pub(crate) fn join(

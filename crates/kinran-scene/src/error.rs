@@ -64,6 +64,31 @@ pub enum Error {
 }
 
 impl Error {
+    /// What kind of error it is, in the words of [`kinran_image::Error::code`]; `input` for a file in the wrong place.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Error::Io { .. } | Error::Unreadable { .. } => "io",
+            Error::Malformed { .. } => "malformed",
+            Error::Unsupported { .. } => "unsupported",
+            Error::Outside { .. } => "input",
+            Error::Image(error) => error.code(),
+            Error::Cancelled(_) => "cancelled",
+        }
+    }
+
+    /// The file that it is about.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Error::Io { path, .. }
+            | Error::Malformed { path, .. }
+            | Error::Unsupported { path, .. }
+            | Error::Unreadable { path, .. }
+            | Error::Outside { path, .. } => Some(path),
+            Error::Image(error) => error.file(),
+            Error::Cancelled(_) => None,
+        }
+    }
+
     pub(crate) fn io(path: impl AsRef<Path>, source: std::io::Error) -> Self {
         Error::Io { path: path.as_ref().to_path_buf(), source }
     }

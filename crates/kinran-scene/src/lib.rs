@@ -47,7 +47,7 @@ mod studio;
 mod tangent;
 mod texture_ref;
 
-pub use container::is_gltf;
+pub use container::{glb, is_gltf};
 pub use detail::{
     DETAIL_EXTENSION, DETAIL_LAYERS_MAX, Detail, DetailLayer, DetailMap, DetailMask, LayerTransform,
 };

@@ -22,8 +22,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Err(Error::Cancelled) => return Ok(()),
         Err(error) => return Err(format!("{}: {error}", error.code()).into()),
     }
+    let folder = OutputFolder::new(&folder);
     for (name, bytes) in out.files() {
-        OutputFolder::new(&folder).put(&name.to_string_lossy(), &bytes)?;
+        folder.put(&name.to_string_lossy(), &bytes)?;
     }
-    Ok(())
+    Ok(folder.finish()?)
 }

@@ -31,15 +31,23 @@
 pub mod bake;
 mod check;
 pub mod content;
+pub mod detail;
 mod error;
+pub mod fit;
+pub mod inspect;
+pub mod library;
+mod names;
 pub mod options;
+mod outgoing;
 pub mod report;
 mod sink;
 pub mod skin;
+mod skin_profile;
 mod task;
+mod textures;
 
 pub use check::{Finding, check};
-pub use error::Error;
+pub use error::{Error, InputFault};
 pub use kinran_image::{Disk, Entry, Files, Memory};
 pub use sink::{OutputFolder, Sink, Space};
 pub use task::{Cancel, Progress, Stage, Task};

@@ -155,14 +155,13 @@ impl Report {
         file: &str,
         others: Vec<WrittenFile>,
     ) -> Result<(), Error> {
-        let textures = self.surfaces.iter().flat_map(|s| &s.outputs);
-        let textures =
-            textures.map(|o| WrittenFile { file: o.file.clone(), bytes: o.bytes, blake3: o.blake3.clone() });
-        self.written = textures.chain(others).collect();
+        let textures = self.surfaces.iter().flat_map(|s| &s.outputs).cloned();
+        self.written = textures.map(WrittenFile::from).chain(others).collect();
         self.kept = kept_files(out, file, &self.written);
         let mut text = serde_json::to_string_pretty(self).map_err(|e| Error::Internal(e.to_string()))?;
         text.push('\n');
-        out.put(file, text.as_bytes())
+        out.put(file, text.as_bytes())?;
+        out.finish()
     }
 }
 
@@ -182,6 +181,12 @@ impl WrittenFile {
     pub fn new(file: impl Into<String>, bytes: &[u8]) -> Self {
         let blake3 = blake3::hash(bytes).to_hex().to_string();
         WrittenFile { file: file.into(), bytes: bytes.len(), blake3 }
+    }
+}
+
+impl From<Output> for WrittenFile {
+    fn from(output: Output) -> Self {
+        WrittenFile { file: output.file, bytes: output.bytes, blake3: output.blake3 }
     }
 }
 

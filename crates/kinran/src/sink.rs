@@ -1,9 +1,10 @@
 //! Where files go: a folder on a disk, or memory.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use kinran_bake::cache::relative;
-use kinran_image::{Format, Memory, full_level_count, level_size, write_atomically};
+use kinran_image::{Format, Memory, Staging, full_level_count, level_size};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -22,13 +23,22 @@ pub trait Sink: Sync {
         Ok(())
     }
 
-    /// Takes a file, whole or not at all; one of that name is replaced.
+    /// Takes a file, whole or not at all; one of that name is replaced, at the latest by [`Sink::finish`].
     ///
     /// # Errors
     /// Where it cannot be written.
     fn put(&self, name: &str, bytes: &[u8]) -> Result<(), Error>;
 
-    /// The file of a name, where there is one: what an earlier run wrote. Asked at any time, also before
+    /// Hears that the files so far are all of a piece of work, a report and what it names: of what is stopped before, or fails,
+    /// a destination may show nothing. Whoever puts files calls it.
+    ///
+    /// # Errors
+    /// Where they cannot be written.
+    fn finish(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// The file of a name, where there is one: what was put, or what an earlier run wrote. Asked at any time, also before
     /// [`Sink::expect`].
     fn get(&self, name: &str) -> Option<Vec<u8>>;
 
@@ -40,18 +50,24 @@ pub trait Sink: Sync {
     fn is_on_disk(&self) -> bool;
 }
 
-/// A folder on a disk. It is made when the first file comes; each file appears by rename.
-#[derive(Clone, Debug)]
+/// A folder on a disk. It is made when the first file comes. The files of a piece of work lie aside until
+/// [`Sink::finish`], and appear one after the other, by rename; those of a piece that never finishes go with this value.
+#[derive(Debug)]
 #[non_exhaustive]
 pub struct OutputFolder {
     /// Its path.
     pub path: PathBuf,
+    staging: Mutex<Option<Staging>>,
 }
 
 impl OutputFolder {
     /// The folder at a path.
     pub fn new(path: impl AsRef<Path>) -> Self {
-        OutputFolder { path: path.as_ref().to_path_buf() }
+        OutputFolder { path: path.as_ref().to_path_buf(), staging: Mutex::new(None) }
+    }
+
+    fn staging(&self) -> MutexGuard<'_, Option<Staging>> {
+        self.staging.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -63,19 +79,30 @@ pub(crate) fn place_in(out: &dyn Sink, name: &str) -> Option<PathBuf> {
 
 impl Sink for OutputFolder {
     fn put(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
-        if relative(name).is_none() {
+        let Some(name) = relative(name) else {
             let reason =
                 format!("{name}: leads out of the folder {}; write it elsewhere", self.path.display());
             return Err(kinran_image::Error::Unsupported(reason).into());
+        };
+        let mut staging = self.staging();
+        let staging = match &mut *staging {
+            Some(staging) => staging,
+            none => none.insert(Staging::new(&self.path)?),
+        };
+        Ok(staging.put(&name, bytes)?)
+    }
+
+    fn finish(&self) -> Result<(), Error> {
+        match self.staging().take() {
+            Some(staging) => Ok(staging.publish()?),
+            None => Ok(()),
         }
-        let path = self.path.join(name);
-        let folder = path.parent().unwrap_or(&self.path);
-        kinran_image::make_folder(folder)?;
-        Ok(write_atomically(&path, bytes)?)
     }
 
     fn get(&self, name: &str) -> Option<Vec<u8>> {
-        let path = self.path.join(relative(name)?);
+        let name = relative(name)?;
+        let staged = self.staging().as_ref().and_then(|staging| staging.find(&name));
+        let path = staged.unwrap_or_else(|| self.path.join(name));
         path.is_file().then(|| std::fs::read(path).ok())?
     }
 

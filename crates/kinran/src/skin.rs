@@ -1,36 +1,107 @@
 //! The tables that skin is lit with.
 //!
 //! ```
-//! use kinran::skin::{Profile, TableOptions, tables};
+//! use kinran::skin::{TableOptions, tables};
 //! use kinran::{Memory, Task};
 //!
 //! let (mut how, out) = (TableOptions::default(), Memory::new());
 //! how.size = (32, 16);
-//! let mut made = tables(&Profile::default(), "human skin", &how, &out, Task::QUIET)?;
-//! made.write_report(&how, Vec::new(), &out)?;
+//! let report = tables(&Memory::new(), &how, None, &out, Task::QUIET)?;
+//! assert_eq!(report.profile, "human skin, six Gaussians");
 //! assert!(out.get("skin_punctual.ktx2").is_some() && out.get("skin.kinran.json").is_some());
 //! # Ok::<(), kinran::Error>(())
 //! ```
 
+use std::path::PathBuf;
+
 use kinran_bake::skin_lut::{
     INTERPOLATION_GRID, ambient_table, penumbra_table, punctual_interpolation_error, punctual_table,
 };
-use kinran_image::{encode_dds, encode_ktx2};
+use kinran_image::Files;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::content::Content;
+use crate::error::InputFault;
+use crate::names::file_name;
 use crate::options::Container;
 use crate::report::{WrittenFile, kept_files};
+use crate::sink::place_in;
+use crate::skin_profile;
+use crate::textures::put_texture;
 use crate::{Error, Sink, Space, Stage, Task};
 
 pub use kinran_bake::skin_lut::{Profile, Table, TableFormat};
 pub use kinran_shading::skin::profile::Gaussian;
 
+use kinran_shading::skin::profile::ProfileError;
+
+/// Where a diffusion profile comes from.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub enum ProfileSource {
+    /// Human skin, as a sum of six Gaussians.
+    #[default]
+    HumanSkin,
+    /// Burley's normalised diffusion: d of red, green and blue, mm.
+    Burley([f64; 3]),
+    /// Burley's normalised diffusion by mean free path.
+    MeanFreePath {
+        /// Mean free path of red, green and blue, mm.
+        path: [f64; 3],
+        /// Their diffuse albedo, 0 to 1.
+        albedo: [f64; 3],
+    },
+    /// A file: a `.csv` of rows of distance in mm and density for red, green and blue, or a `.json` of Gaussians.
+    File(PathBuf),
+    /// A profile, and what reports call it.
+    Given(Profile, String),
+}
+
+impl ProfileSource {
+    /// The profile, and what it is called.
+    ///
+    /// # Errors
+    /// Where a file is none of a profile, or the numbers are none.
+    pub fn read(&self, files: &dyn Files) -> Result<(Profile, String), Error> {
+        let list = |d: &[f64; 3]| format!("{}, {}, {}", d[0], d[1], d[2]);
+        let (profile, described) = match self {
+            ProfileSource::HumanSkin => (Profile::default(), "human skin, six Gaussians".to_owned()),
+            ProfileSource::Burley(d) => (Profile::Burley(*d), format!("Burley, d = {} mm", list(d))),
+            ProfileSource::MeanFreePath { path, albedo } => (
+                Profile::MeanFreePath { path: *path, albedo: *albedo },
+                format!("Burley, mean free path {} mm, albedo {}", list(path), list(albedo)),
+            ),
+            ProfileSource::File(file) => (skin_profile::read(files, file)?, file_name(file)),
+            ProfileSource::Given(profile, name) => (profile.clone(), name.clone()),
+        };
+        match profile.radial() {
+            Err(error) => Err(self.refused(error)),
+            Ok(_) => Ok((profile, described)),
+        }
+    }
+
+    /// What is wrong with a profile, of who gave it.
+    fn refused(&self, error: ProfileError) -> Error {
+        let option = match self {
+            ProfileSource::File(file) => {
+                return Error::Input { path: file.clone(), fault: InputFault::Profile(error) };
+            }
+            ProfileSource::Given(..) => return Error::Profile(error),
+            ProfileSource::Burley(_) => "burley",
+            ProfileSource::MeanFreePath { .. } => "mean-free-path",
+            ProfileSource::HumanSkin => "scale",
+        };
+        Error::Option { option, given: String::new(), file: None, reason: error.to_string() }
+    }
+}
+
 /// Which tables are made.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct TableOptions {
+    /// The profile; human skin by default.
+    pub profile: ProfileSource,
     /// What the files' names begin with; "skin" by default.
     pub name: String,
     /// Texels of the punctual table, 2 to 4096 along a side; 512 by default.
@@ -50,6 +121,7 @@ pub struct TableOptions {
 impl Default for TableOptions {
     fn default() -> Self {
         TableOptions {
+            profile: ProfileSource::default(),
             name: "skin".into(),
             size: (512, 512),
             range: 0.5,
@@ -65,9 +137,14 @@ impl Default for TableOptions {
 const PENUMBRA: u32 = 64;
 
 impl TableOptions {
-    /// The name of a table's file: `skin_punctual.ktx2`.
-    fn file(&self, content: Content, extension: &str) -> String {
-        format!("{}_{}.{extension}", self.name, content.name().trim_start_matches("skin-"))
+    /// The name of a table's files without their extension: `skin_punctual`.
+    fn stem(&self, content: Content) -> String {
+        format!("{}_{}", self.name, content.name().trim_start_matches("skin-"))
+    }
+
+    /// The name of the plot.
+    pub fn plot(&self) -> String {
+        format!("{}.png", self.name)
     }
 
     /// The name of the report.
@@ -107,7 +184,8 @@ impl TableOptions {
         let penumbra = self.penumbra.then_some(Content::SkinPenumbra);
         let contents = [Content::SkinPunctual, Content::SkinAmbient].into_iter().chain(penumbra);
         let extensions = self.container.extensions();
-        let files = contents.flat_map(|content| extensions.iter().map(move |e| self.file(content, e)));
+        let files = contents
+            .flat_map(|content| extensions.iter().map(move |e| format!("{}.{e}", self.stem(content))));
         let texel = if self.format == TableFormat::Rgba16F { 8 } else { 4 };
         let (width, height) = self.size;
         let penumbra =
@@ -115,6 +193,25 @@ impl TableOptions {
         let texels = u64::from(width) * u64::from(height) + 2 * u64::from(width) + penumbra;
         (files.collect(), Space::exact(texels * texel * extensions.len() as u64))
     }
+}
+
+/// Draws a plot of tables, as the bytes of a PNG.
+pub type Plot<'a> = &'a (dyn Fn(&Tables) -> Result<Vec<u8>, Error> + Sync);
+
+/// Tables before their compression.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Tables {
+    /// What their files' names begin with.
+    pub name: String,
+    /// What their profile is called.
+    pub profile: String,
+    /// What part of a punctual light leaves skin: across, n·u from -1 to 1; down, curvature from 0 to the range.
+    pub punctual: Table,
+    /// What remains of bands 1 and 2 of ambient light's harmonics: across, mean curvature from 0 to the range.
+    pub ambient: Table,
+    /// Their largest curvature, 1/mm.
+    pub range: f32,
 }
 
 /// What was made.
@@ -159,36 +256,34 @@ pub struct TableReport {
     pub interpolation_error: Option<f32>,
 }
 
-/// Tables before their compression, and what is known of their files.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct Tables {
-    /// What part of a punctual light leaves skin: across, n·u from -1 to 1; down, curvature from 0 to the range.
-    pub punctual: Table,
-    /// What remains of bands 1 and 2 of ambient light's harmonics: across, mean curvature from 0 to the range.
-    pub ambient: Table,
-    /// What was made; its [`TablesReport::written`] are the tables.
-    pub report: TablesReport,
-}
-
-/// Integrates tables of a profile and writes them: NAME_punctual, NAME_ambient and, where it is asked for, NAME_penumbra.
-/// `described` names the profile in the report, which [`Tables::write_report`] writes when all is done.
+/// Integrates tables of a profile and writes them: NAME_punctual, NAME_ambient and, where it is asked for, NAME_penumbra; the
+/// plot, if there is who draws one, as NAME.png; and NAME.kinran.json, which says how they were made.
 ///
 /// # Errors
-/// [`Error::Option`] where an option is out of its range, [`Error::Profile`] where the profile is none; whatever the
-/// destination has against the files.
+/// [`Error::Option`] where an option is out of its range; whatever is wrong with the profile, or the destination has against
+/// the files.
 pub fn tables(
-    profile: &Profile,
-    described: &str,
+    files: &dyn Files,
     how: &TableOptions,
+    plot: Option<Plot<'_>>,
     out: &dyn Sink,
     task: Task<'_>,
-) -> Result<Tables, Error> {
+) -> Result<TablesReport, Error> {
     how.check()?;
-    let profile = scaled(profile, f64::from(how.scale));
-    let radial = profile.radial().map_err(Error::Profile)?;
+    let (profile, described) = how.profile.read(files)?;
+    let profile = scaled(&profile, f64::from(how.scale));
+    let radial = profile.radial().map_err(|error| how.profile.refused(error))?;
     let (mut names, space) = how.plan();
+    names.extend(plot.map(|_| how.plot()));
     names.push(how.report());
+    if let ProfileSource::File(file) = &how.profile {
+        let place = files.place(file);
+        let is_it = |name: &&String| place.is_some() && place_in(out, name) == place;
+        if let Some(name) = names.iter().find(is_it) {
+            let file = out.place(name).filter(|_| out.is_on_disk()).unwrap_or_else(|| name.into());
+            return Err(Error::OverMap { file });
+        }
+    }
     out.expect(&names, space)?;
     let (width, height) = (how.size.0 as usize, how.size.1 as usize);
     let range = f64::from(how.range);
@@ -201,7 +296,7 @@ pub fn tables(
 
     let mut report = TablesReport {
         kinran: env!("CARGO_PKG_VERSION"),
-        profile: described.into(),
+        profile: described.clone(),
         scale: how.scale,
         range: how.range,
         tables: Vec::new(),
@@ -222,27 +317,23 @@ pub fn tables(
         let axes = ["filtered shadow from 0 to 1", "one over the penumbra's width from 0 to 1/mm"];
         add(Content::SkinPenumbra, &table, axes, None)?;
     }
-    Ok(Tables { punctual, ambient, report })
-}
-
-impl Tables {
-    /// Writes the report; `others` are files that were written besides the tables.
-    ///
-    /// # Errors
-    /// Where it cannot be written.
-    pub fn write_report(
-        &mut self,
-        how: &TableOptions,
-        others: Vec<WrittenFile>,
-        out: &dyn Sink,
-    ) -> Result<(), Error> {
-        let report = &mut self.report;
-        report.written.extend(others);
-        report.kept = kept_files(out, &how.report(), &report.written);
-        let mut text = serde_json::to_string_pretty(report).map_err(|e| Error::Internal(e.to_string()))?;
-        text.push('\n');
-        out.put(&how.report(), text.as_bytes())
+    if let Some(plot) = plot {
+        let bytes = plot(&Tables {
+            name: how.name.clone(),
+            profile: described,
+            punctual,
+            ambient,
+            range: how.range,
+        })?;
+        out.put(&how.plot(), &bytes)?;
+        report.written.push(WrittenFile::new(how.plot(), &bytes));
     }
+    report.kept = kept_files(out, &how.report(), &report.written);
+    let mut text = serde_json::to_string_pretty(&report).map_err(|e| Error::Internal(e.to_string()))?;
+    text.push('\n');
+    out.put(&how.report(), text.as_bytes())?;
+    out.finish()?;
+    Ok(report)
 }
 
 /// A profile with other lengths. Densities are normalised later: only lengths matter.
@@ -275,19 +366,11 @@ fn put_table(
         TableFormat::Linear8 => "rgba8",
     };
     let mut texture = table.texture(how.format)?;
-    content.mark(&mut texture);
     texture.metadata.insert("KinranRange".into(), how.range.to_string());
-    let mut files = Vec::new();
-    for extension in how.container.extensions() {
-        let file = how.file(content, extension);
-        let bytes = match *extension {
-            "dds" => encode_dds(&texture)?,
-            _ => encode_ktx2(&texture, None)?,
-        };
-        out.put(&file, &bytes)?;
-        written.push(WrittenFile::new(&*file, &bytes));
-        files.push(file);
-    }
+    let encoding_error = table.texture_error(&texture)?;
+    let put = put_texture(how.container, 0, &how.stem(content), content, texture, out)?;
+    let files = put.iter().map(|output| output.file.clone()).collect();
+    written.extend(put.into_iter().map(WrittenFile::from));
     Ok(TableReport {
         files,
         width: table.width,
@@ -295,7 +378,7 @@ fn put_table(
         format: label,
         across,
         down,
-        encoding_error: table.texture_error(&texture)?,
+        encoding_error,
         interpolation_error,
     })
 }

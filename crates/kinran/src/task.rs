@@ -63,6 +63,22 @@ pub enum Stage {
     Curvature,
     /// Tables of skin are integrated; units are points.
     Tables,
+    /// A tile is compressed; units are texels of all levels.
+    Compressing,
+    /// An opacity of layers is looked for; units are texels of all trials.
+    Fading,
+    /// Resolutions of a map are tried; units are texels of all trials.
+    Resolutions,
+    /// A map is solved; units are texels of all levels.
+    Solving,
+    /// The same, and each part of the method is measured.
+    Comparing,
+    /// Targets are painted and solved; units are texels of all solutions.
+    Studying,
+    /// It is found out which entries of a library are up to date; units are entries.
+    Checking,
+    /// Entries of a library are baked; units are about the bytes of their files.
+    Baking,
     /// Files are written.
     Writing,
 }
@@ -75,6 +91,8 @@ pub struct Progress<'a> {
     pub stage: Stage,
     /// With which material, file or mesh; empty where it is all.
     pub of: &'a str,
+    /// Of which entry of a library; empty elsewhere.
+    pub entry: &'a str,
     /// Units that are done.
     pub done: u64,
     /// Units in all; 0 while nobody knows.
@@ -84,8 +102,11 @@ pub struct Progress<'a> {
 }
 
 impl fmt::Display for Progress<'_> {
-    /// In a few words: "writing brocade".
+    /// In a few words: "writing brocade", of an entry "materials/brocade: writing brocade".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.entry.is_empty() {
+            write!(f, "{}: ", self.entry)?;
+        }
         match self.stage {
             Stage::Reading => write!(f, "reading")?,
             Stage::Filtering(filter) => write!(f, "{}", filter.name())?,
@@ -94,6 +115,14 @@ impl fmt::Display for Progress<'_> {
             Stage::Normals => write!(f, "normals")?,
             Stage::Curvature => write!(f, "curvature")?,
             Stage::Tables => write!(f, "integrating tables")?,
+            Stage::Compressing => write!(f, "compressing")?,
+            Stage::Fading => write!(f, "fading the layers")?,
+            Stage::Resolutions => write!(f, "trying resolutions")?,
+            Stage::Solving => write!(f, "solving")?,
+            Stage::Comparing => write!(f, "solving and comparing")?,
+            Stage::Studying => write!(f, "painting and solving")?,
+            Stage::Checking => write!(f, "checking")?,
+            Stage::Baking => write!(f, "baking")?,
             Stage::Writing => write!(f, "writing")?,
         }
         if self.of.is_empty() { Ok(()) } else { write!(f, " {}", self.of) }
@@ -145,7 +174,7 @@ impl Work<'_> {
 
     fn tell(&self, is_over: bool) {
         let [done, total] = [&self.done, &self.total].map(|count| count.load(Ordering::Relaxed));
-        (self.task.tell)(Progress { stage: self.stage, of: &self.of, done, total, is_over });
+        (self.task.tell)(Progress { stage: self.stage, of: &self.of, entry: "", done, total, is_over });
     }
 }
 

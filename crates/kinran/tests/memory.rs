@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use common::{maps, model, png};
 use kinran::bake::{CurvatureOptions, FolderOptions, GltfOptions, Which, folder, gltf, understand};
 use kinran::options::{Container, Form};
-use kinran::skin::{Profile, TableOptions, tables};
+use kinran::skin::{Profile, ProfileSource, TableOptions, tables};
 use kinran::{Cancel, Disk, Error, Files, Memory, OutputFolder, Progress, Sink, Task, check};
 use kinran_image::{Channels, Encoder, Texture, decode_ktx2, encode_ktx2};
 
@@ -101,14 +101,15 @@ fn a_model_in_memory_reads_what_lies_outside_of_its_folder() {
 fn tables_of_skin_break_the_rules_for_tables() {
     let (mut how, out) = (TableOptions::default(), Memory::new());
     (how.size, how.penumbra, how.container) = ((16, 8), true, Container::Both);
-    let mut made = tables(&Profile::Burley([1.0, 0.5, 0.3]), "Burley", &how, &out, Task::QUIET).unwrap();
-    made.write_report(&how, Vec::new(), &out).unwrap();
+    how.profile = ProfileSource::Burley([1.0, 0.5, 0.3]);
+    let made = tables(&Memory::new(), &how, None, &out, Task::QUIET).unwrap();
     let (names, _) = how.plan();
-    assert_eq!(made.report.written.iter().map(|w| w.file.clone()).collect::<Vec<_>>(), names);
+    assert_eq!(made.written.iter().map(|w| w.file.clone()).collect::<Vec<_>>(), names);
     for name in names.iter().map(String::as_str).chain(["skin.kinran.json"]) {
         assert_eq!(check(&out, name.as_ref()).unwrap(), [], "{name}");
     }
-    let none = tables(&Profile::Burley([0.0; 3]), "none", &how, &Memory::new(), Task::QUIET);
+    how.profile = ProfileSource::Given(Profile::Burley([0.0; 3]), "none".into());
+    let none = tables(&Memory::new(), &how, None, &Memory::new(), Task::QUIET);
     assert!(matches!(none, Err(Error::Profile(_))), "{none:?}");
 }
 
@@ -154,7 +155,7 @@ fn numbers_out_of_their_ranges_are_taken() {
     let tables_of = |change: &dyn Fn(&mut TableOptions)| {
         let mut how = TableOptions::default();
         change(&mut how);
-        tables(&Profile::default(), "", &how, &Memory::new(), Task::QUIET).map(drop)
+        tables(&Memory::new(), &how, None, &Memory::new(), Task::QUIET).map(drop)
     };
     let curvature_of = |change: &dyn Fn(&mut CurvatureOptions)| {
         let mut how = GltfOptions::default();

@@ -11,9 +11,10 @@ use std::path::Path;
 type Module = Vec<String>;
 
 /// Crates whose files are looked at.
-const CRATES: [&str; 8] = [
+const CRATES: [&str; 9] = [
     "kinran",
     "kinran-bake",
+    "kinran-cli",
     "kinran-image",
     "kinran-render",
     "kinran-scene",
@@ -22,6 +23,9 @@ const CRATES: [&str; 8] = [
     "xtask",
 ];
 
+/// A comparison and its sheet, which are still to be parted: the only name that is not looked at.
+const STILL_THERE: (&str, [&str; 2]) = ("kinran-cli", ["compare", "compare_sheet"]);
+
 #[test]
 fn files_name_each_other_in_a_circle() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
@@ -29,7 +33,15 @@ fn files_name_each_other_in_a_circle() {
         let mut files = BTreeMap::new();
         read_modules(&crates.join(name).join("src"), &[], &mut files);
         assert!(!files.is_empty(), "{name} has no files");
-        let circle = circle(&names(&files));
+        let mut graph = names(&files);
+        if name == STILL_THERE.0 {
+            let [from, to] = STILL_THERE.1.map(module_of);
+            assert!(
+                graph.get_mut(&from).is_some_and(|named| named.remove(&to)),
+                "it is parted; look at all names"
+            );
+        }
+        let circle = circle(&graph);
         assert!(circle.is_empty(), "{name}: a circle of files: {}", circle.join(" -> "));
     }
 }

@@ -8,12 +8,15 @@ use kinran_image::{
 use kinran_scene::Wrap;
 use kinran_shading::normal_from_xy;
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::aniso::{Kernel, Taps};
 use crate::mips::{BAND_ROWS, PlaneRows, TILE, reduce_levels, unorm8};
 
 /// What a map holds, which decides how it is blended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum MapKind {
     /// sRGB colour: albedo, specular colour. Blended in linear light, by overlay.
     Color,
@@ -26,6 +29,16 @@ pub enum MapKind {
 }
 
 impl MapKind {
+    /// The name in reports and options.
+    pub fn name(self) -> &'static str {
+        match self {
+            MapKind::Color => "color",
+            MapKind::Data => "data",
+            MapKind::Normal => "normal",
+            MapKind::Aniso => "aniso",
+        }
+    }
+
     /// How tiles and targets of this kind are stored.
     pub fn transfer(self) -> Transfer {
         if self == MapKind::Color { Transfer::Srgb } else { Transfer::Linear }

@@ -1,12 +1,12 @@
 //! `kinran bake` of a folder of authored maps.
 
 use kinran::report::{Report, SurfaceReport};
-use kinran::{Disk, Sink, Space, bake};
+use kinran::{Disk, Sink, bake};
 use kinran_bake::folder::{Folder, Role as MapRole, Row};
 
+use super::Args;
 use super::report::{BakeReport, text};
-use super::{Args, file_name};
-use crate::outputs::Output;
+use crate::outputs::{Output, file_name};
 use crate::progress::Bars;
 use crate::{Console, Error};
 
@@ -30,20 +30,15 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
 }
 
 /// What there is to bake in a folder.
-pub(super) fn understand(args: &Args) -> Result<Folder, Error> {
+fn understand(args: &Args) -> Result<Folder, Error> {
     Ok(bake::understand(&Disk, &args.input, &args.folder_options())?)
 }
 
 /// Bakes every material found in a folder.
-pub(super) fn bake_folder(args: &Args, folder: &Folder, console: &Console) -> Result<Vec<Report>, Error> {
+fn bake_folder(args: &Args, folder: &Folder, console: &Console) -> Result<Vec<Report>, Error> {
     let (how, bars) = (args.folder_options(), Bars::new(console.progress()));
-    let out = Output { folder: args.output(), input: &args.input, force: args.force, console };
+    let out = Output::new(args.output(), &args.input, args.force, console);
     Ok(bake::folder(&Disk, &args.input, folder, &how, &out, bars.task())?)
-}
-
-/// Bytes that the files of a folder will take, by the headers of its maps alone: a library asks for thousands.
-pub(super) fn space(args: &Args) -> Result<Space, Error> {
-    Ok(bake::folder_plan(&Disk, &args.input, &understand(args)?, &args.folder_options())?.1)
 }
 
 /// A sentence for each flag that had nothing to act on.
@@ -107,7 +102,7 @@ pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
     }
     drop(stage);
     let (names, space) = bake::folder_plan(&Disk, &args.input, &folder, &args.folder_options())?;
-    Output { folder: args.output(), input: &args.input, force: args.force, console }.expect(&names, space)?;
+    Output::new(args.output(), &args.input, args.force, console).expect(&names, space)?;
     report.warnings.extend(idle(args, &folder.rows));
     report.warnings.iter().for_each(|warning| console.warn(warning));
     console.result(&BakeReport::new(args, folder.rows.clone(), vec![report]), &folder.table())

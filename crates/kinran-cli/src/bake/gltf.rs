@@ -1,12 +1,12 @@
 //! `kinran bake` of a glTF file.
 
 use kinran::report::{Report, SurfaceReport};
-use kinran::{Disk, Space, bake};
+use kinran::{Disk, bake};
 use kinran_bake::aniso::RoughnessMaps;
 
+use super::Args;
 use super::report::{BakeReport, text};
-use super::{Args, file_name};
-use crate::outputs::Output;
+use crate::outputs::{Output, file_name};
 use crate::progress::Bars;
 use crate::{Console, Error};
 
@@ -23,20 +23,17 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
 }
 
 /// Bakes every material of a glTF file that has a normal, a roughness or an anisotropy map.
-pub(super) fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
-    let (how, bars) = (args.gltf_options()?, Bars::new(console.progress()));
-    let out = Output { folder: args.output(), input: &args.input, force: args.force, console };
+fn bake_gltf(args: &Args, console: &Console) -> Result<Report, Error> {
+    args.model.allowed()?;
+    let (how, bars) = (args.gltf_options(), Bars::new(console.progress()));
+    let out = Output::new(args.output(), &args.input, args.force, console);
     Ok(bake::gltf(&Disk, &args.input, &how, &out, bars.task())?)
-}
-
-/// Bytes that a model's files will take, by the headers of its images alone: a library asks for thousands.
-pub(super) fn space(args: &Args) -> Result<Space, Error> {
-    Ok(bake::gltf_space(&Disk, &args.input, &args.gltf_options()?)?)
 }
 
 /// Says which materials would be baked from what.
 pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
-    let (how, bars) = (args.gltf_options()?, Bars::new(console.progress()));
+    args.model.allowed()?;
+    let (how, bars) = (args.gltf_options(), Bars::new(console.progress()));
     let understood = bake::understand_gltf(&Disk, &args.input, &how, bars.task())?;
     let mut report = Report::new(&how.textures);
     report.warnings.clone_from(&understood.warnings);

@@ -1,15 +1,16 @@
 //! Flags of `kinran bake`, `kinran detail solve` and `kinran skin-lut` as a manifest gives them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{ArgAction, CommandFactory, Parser};
+use kinran::detail::SolveOptions;
+use kinran::library::JobOptions;
 use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError, Setting, SettingValue};
-use kinran_image::{Encoding, Role};
 
 use super::Args;
 use super::flags::Flag;
 use crate::Error;
-use crate::detail::{BlockFormat, SolveArgs, default_format};
+use crate::detail::SolveArgs;
 use crate::skin_lut;
 use crate::values::range_in_words;
 
@@ -34,61 +35,6 @@ struct SkinFlags {
     args: skin_lut::Args,
 }
 
-/// How an entry is baked; input and output are not set.
-#[derive(Clone, Debug)]
-pub(super) enum Flags {
-    /// [`Kind::Aniso`] and [`Kind::Mesh`].
-    Bake(Box<Args>),
-    /// [`Kind::Detail`].
-    Detail(Box<SolveArgs>),
-    /// [`Kind::Skin`].
-    Skin(Box<skin_lut::Args>),
-}
-
-impl Flags {
-    /// The flags, with other paths for the files that they name.
-    pub(super) fn with_files(&self, file: &mut dyn FnMut(&Path) -> PathBuf) -> Flags {
-        let mut flags = self.clone();
-        match &mut flags {
-            Flags::Bake(args) => {
-                args.map.iter_mut().for_each(|(_, path)| *path = file(path));
-                args.exr_layer.iter_mut().for_each(|(path, _)| *path = file(path));
-            }
-            Flags::Detail(args) => {
-                for layer in &mut args.layer {
-                    layer.tile = file(&layer.tile);
-                    layer.mask = layer.mask.as_deref().map(&mut *file);
-                }
-                args.exr_layer.iter_mut().for_each(|(path, _)| *path = file(path));
-                args.model = args.model.as_deref().map(file);
-            }
-            Flags::Skin(args) => args.profile = args.profile.as_deref().map(file),
-        }
-        flags
-    }
-
-    /// How textures may be compressed.
-    pub(super) fn encodings(&self) -> Vec<Encoding> {
-        match self {
-            Flags::Bake(args) => {
-                let how = args.textures();
-                vec![
-                    how.encoding(Role::Normal, args.normal_format),
-                    how.encoding(Role::Aniso, args.aniso_format),
-                    how.encoding(Role::Color, args.color_format),
-                ]
-            }
-            Flags::Detail(args) => {
-                let format = args.format.unwrap_or_else(|| default_format(args.kind()));
-                let masks = args.layer.iter().any(|layer| layer.mask.is_some()).then_some(BlockFormat::Bc7);
-                let formats = [Some(format), args.tile_format, masks].into_iter().flatten();
-                formats.map(BlockFormat::encoding).collect()
-            }
-            Flags::Skin(_) => Vec::new(),
-        }
-    }
-}
-
 /// Refuses flags that a manifest sets for its entries.
 pub(super) fn refuse_others(args: &Args) -> Result<(), Error> {
     let of_entries = super::flags::FLAGS.iter().find(|flag| flag.is_of_entries() && (flag.given)(args));
@@ -107,8 +53,8 @@ fn is_of_the_run(name: &str) -> bool {
     Flag::named(name).is_some_and(|flag| !flag.is_of_entries())
 }
 
-/// The flags of a job.
-pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestError> {
+/// How a job is baked.
+pub(super) fn options(manifest: &Manifest, job: &Job) -> Result<JobOptions, ManifestError> {
     let mut all = words_before(job.kind);
     if job.kind == Kind::Skin && !job.input.as_os_str().is_empty() {
         all.push(format!("--profile={}", job.input.display()));
@@ -126,14 +72,15 @@ pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestErr
             layer.tile = manifest.beside(&layer.tile);
             layer.mask = layer.mask.as_ref().map(|mask| manifest.beside(mask));
         }
-        let images: Vec<PathBuf> = args.images().cloned().collect();
+        let images = SolveOptions::new(args.layer.clone());
+        let images: Vec<PathBuf> = std::iter::once(&args.target).chain(images.images()).cloned().collect();
         for (path, _) in &mut args.exr_layer {
             let known = images.iter().find(|image| image.file_name() == Some(path.as_os_str()));
             *path = known.cloned().unwrap_or_else(|| manifest.beside(&*path));
         }
         args.model = args.model.as_ref().map(|model| manifest.beside(model));
         args.trust.allow_outside.iter_mut().for_each(|folder| *folder = manifest.beside(&*folder));
-        return Ok(Flags::Detail(Box::new(args)));
+        return Ok(JobOptions::Detail(args.options()));
     }
     if job.kind == Kind::Skin {
         let mut args = SkinFlags::try_parse_from(all).map_err(wrong)?.args;
@@ -141,7 +88,7 @@ pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestErr
         if job.input.as_os_str().is_empty() {
             args.profile = args.profile.as_ref().map(|profile| manifest.beside(profile));
         }
-        return Ok(Flags::Skin(Box::new(args)));
+        return Ok(JobOptions::Skin(args.options()));
     }
     let mut args = BakeFlags::try_parse_from(all).map_err(wrong)?.args;
     (args.textures().check()).map_err(|e| manifest.error(&job.place, Error::from(e).to_string()))?;
@@ -153,7 +100,15 @@ pub(super) fn flags(manifest: &Manifest, job: &Job) -> Result<Flags, ManifestErr
             *path = manifest.beside(&*path);
         }
     }
-    Ok(Flags::Bake(Box::new(args)))
+    // Reports of a library do not say where their inputs are, which every machine has elsewhere.
+    if job.kind == Kind::Mesh {
+        let mut how = args.gltf_options();
+        how.source = None;
+        return Ok(JobOptions::Model(how));
+    }
+    let mut how = args.folder_options();
+    how.source = None;
+    Ok(JobOptions::Folder(how))
 }
 
 fn command(kind: Kind) -> clap::Command {
@@ -267,8 +222,15 @@ fn unknown(command: &clap::Command, name: &str) -> String {
     format!("unknown key `{name}`; expected input, exclude, output, or a flag: {}", names.join(", "))
 }
 
+/// Begins the keys in a message.
+const IN_THE_MANIFEST: &str = "(in the manifest: ";
+
 /// A message about an entry: where it names flags, the keys of the manifest that stand for them too.
 pub(super) fn with_keys(kind: Kind, message: &str) -> String {
+    // Out of an older cache it may have them.
+    if message.contains(IN_THE_MANIFEST) {
+        return message.to_owned();
+    }
     let command = command(kind);
     let words: Vec<&str> = message.split_whitespace().collect();
     let bare = |word: &str| {
@@ -311,7 +273,7 @@ pub(super) fn with_keys(kind: Kind, message: &str) -> String {
     });
     match keys.as_slice() {
         [] => message.to_owned(),
-        keys => format!("{message} (in the manifest: {})", keys.join(", ")),
+        keys => format!("{message} {IN_THE_MANIFEST}{})", keys.join(", ")),
     }
 }
 

@@ -1,67 +1,18 @@
 //! A layer as one flag: `steel.png,scale=4,rotation=30,mask=rust.png,channel=g`.
 
-use std::path::{Path, PathBuf};
-
 use glam::{Vec2, vec2};
-use kinran_bake::folder::{Green, named_role};
-
-use crate::outputs::has_extension;
-
-/// What `--layer` says.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LayerFlag {
-    /// The tile: an image, or a baked .ktx2 or .dds.
-    pub tile: PathBuf,
-    /// Repetitions along u and v.
-    pub scale: Vec2,
-    /// Degrees.
-    pub rotation: f32,
-    /// In tiles.
-    pub offset: Vec2,
-    /// Every other tile is mirrored.
-    pub mirror: bool,
-    /// Hue in degrees.
-    pub hue: f32,
-    /// Factor of saturation.
-    pub saturation: f32,
-    /// Factor of value.
-    pub value: f32,
-    /// How much of it is seen, 0 to 1.
-    pub opacity: f32,
-    /// Where the layer is seen.
-    pub mask: Option<PathBuf>,
-    /// 0 red to 3 alpha.
-    pub channel: usize,
-    /// Of the mask.
-    pub contrast: f32,
-    /// Green of a normal tile grows downwards: as y-down and y-up say, else as the tile's name does.
-    pub y_down: bool,
-}
+use kinran::detail::TiledLayer;
 
 /// Names that a layer takes, for the message.
 const NAMES: &str =
     "scale, rotation, offset, mirror, hue, saturation, value, opacity, mask, channel, contrast, y-down, y-up";
 
 /// `FILE[,NAME=VALUE]...`
-pub(crate) fn layer_flag(text: &str) -> Result<LayerFlag, String> {
+pub(crate) fn layer_flag(text: &str) -> Result<TiledLayer, String> {
     let mut parts = text.split(',');
     let tile = parts.next().map(str::trim).filter(|file| !file.is_empty());
     let Some(tile) = tile else { return Err("write FILE or FILE,scale=4,...".into()) };
-    let mut layer = LayerFlag {
-        tile: tile.into(),
-        scale: Vec2::ONE,
-        rotation: 0.0,
-        offset: Vec2::ZERO,
-        mirror: false,
-        hue: 0.0,
-        saturation: 1.0,
-        value: 1.0,
-        opacity: 1.0,
-        mask: None,
-        channel: 0,
-        contrast: 1.0,
-        y_down: green_by_name(tile.as_ref()),
-    };
+    let mut layer = TiledLayer::new(tile);
     for part in parts {
         let (name, value) = part.split_once('=').unwrap_or((part, ""));
         let (name, value) = (name.trim(), value.trim());
@@ -108,12 +59,6 @@ pub(crate) fn layer_flag(text: &str) -> Result<LayerFlag, String> {
     Ok(layer)
 }
 
-/// Whether an authored normal map's green grows downwards by its name; baked ones are turned already.
-pub(super) fn green_by_name(file: &Path) -> bool {
-    let is_baked = has_extension(file, "ktx2") || has_extension(file, "dds");
-    !is_baked && named_role(file).and_then(|(_, green)| green) == Some(Green::Down)
-}
-
 /// `4` or `4x2`.
 fn pair(name: &str, value: &str) -> Result<Vec2, String> {
     let (x, y) = value.split_once(['x', 'X', '×']).unwrap_or((value, value));
@@ -125,6 +70,8 @@ fn pair(name: &str, value: &str) -> Result<Vec2, String> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::*;
 
     #[test]

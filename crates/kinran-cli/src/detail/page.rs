@@ -1,22 +1,12 @@
 //! The library's report as a page.
 
+use kinran::detail::{PICTURES, StudyMean, StudyReport, StudyRow, picture_file};
 use kinran_bake::detail::ERROR_GAIN;
 
 use crate::page::level_words;
 
-use super::library::{LibraryMean, LibraryReport, LibraryRow};
-
-/// Pictures of a target, in order.
-pub(super) const PICTURES: [&str; 6] =
-    ["detail", "synthesized", "blended", "target", "error", "target-error"];
-
-/// File name of a picture.
-pub(super) fn picture_file(material: &str, map: &str, which: &str, picture: &str) -> String {
-    format!("{material}_{map}_{which}_{picture}.png")
-}
-
 /// A mean as a row of cells.
-pub(super) fn cells(mean: &LibraryMean) -> [String; 13] {
+pub(super) fn cells(mean: &StudyMean) -> [String; 13] {
     [
         mean.map.clone(),
         mean.format.clone(),
@@ -35,7 +25,7 @@ pub(super) fn cells(mean: &LibraryMean) -> [String; 13] {
 }
 
 /// HTML with the means, and for each target its numbers and pictures.
-pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
+pub(super) fn page(report: &StudyReport, pictures: bool) -> String {
     let head = [
         "map",
         "format",
@@ -69,7 +59,7 @@ pub(super) fn page(report: &LibraryReport, pictures: bool) -> String {
             format!("<tr>{cells}\n")
         })
         .collect();
-    let map_of = |row: &LibraryRow| (row.material.clone(), row.map.clone());
+    let map_of = |row: &StudyRow| (row.material.clone(), row.map.clone());
     let sections: String = report
         .rows
         .iter()
@@ -100,7 +90,7 @@ as authored. Error pictures are {ERROR_GAIN} times enlarged.</p>
     crate::page::page("Kinran: detail maps", &body)
 }
 
-fn section(row: &LibraryRow, first: bool, pictures: bool) -> String {
+fn section(row: &StudyRow, first: bool, pictures: bool) -> String {
     let which = row.against.name();
     let heading = if first { format!("<h2>{}, {}</h2>\n", row.material, row.map) } else { String::new() };
     let errors = row.comparison.levels.get(1).unwrap_or(&row.comparison.levels[0]);

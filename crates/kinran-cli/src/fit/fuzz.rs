@@ -4,14 +4,13 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use kinran_bake::fuzz_fit::{AmbientTable, Fitted, FuzzFit, Phase, TABLE_SIZE, ambient_table, fuzz_fit};
-use kinran_image::{Channels, Image, Pixels, write_atomically, write_exr};
-use schemars::JsonSchema;
-use serde::Serialize;
+use kinran::fit::{Fitted, FittedFuzz, FuzzFit, FuzzOptions, FuzzReport, Phase, fuzz};
+use kinran_image::{write_atomically, write_exr};
 
 use super::fuzz_plots::phase_plots;
-use crate::table::table;
-use crate::{Console, Error, outputs, values};
+use crate::table::table as aligned;
+use crate::values::{self, Choices, choice};
+use crate::{Console, Error, outputs};
 
 /// Fits the coefficients of fuzz for one tilt and one spread
 ///
@@ -35,8 +34,8 @@ pub struct FuzzArgs {
     pub spread: f32,
 
     /// How fibres scatter
-    #[arg(long, value_enum, default_value = "fibre")]
-    pub phase: PhaseName,
+    #[arg(long, default_value = "fibre", value_parser = choice(PHASES))]
+    pub phase: Phase,
 
     /// Prints constants for a shader instead of a table
     #[arg(long, value_enum, value_name = "LANGUAGE")]
@@ -53,14 +52,9 @@ pub struct FuzzArgs {
     pub plots: Option<PathBuf>,
 }
 
-/// Names of phase functions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum PhaseName {
-    /// SGGX fibres
-    Fibre,
-    /// Schlick's phase about the fibre
-    Velvet,
-}
+/// Phase functions.
+const PHASES: &Choices<Phase> =
+    &[(Phase::Fibre, "fibre", "SGGX fibres"), (Phase::Velvet, "velvet", "Schlick's phase about the fibre")];
 
 /// Languages that constants come in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -77,24 +71,6 @@ pub enum FuzzLanguage {
     Msl,
 }
 
-/// What was fitted.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct FuzzReport {
-    /// The coefficients.
-    #[serde(flatten)]
-    fit: FuzzFit,
-    /// The table's smallest and largest value over the exact one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    table: Option<[f32; 2]>,
-    /// [`FuzzFit::returned`].
-    returned: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    warning: Option<String>,
-}
-
-/// The error of ambient light above which the polynomial is warned of, as the help of `--table` has it.
-const AMBIENT_OFF: f32 = 0.15;
-
 /// The command.
 pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
     for (path, extension) in [(&args.table, "exr"), (&args.plots, "svg")] {
@@ -102,64 +78,31 @@ pub(super) fn run(args: &FuzzArgs, console: &Console) -> Result<(), Error> {
             outputs::check_file(path, &[extension])?;
         }
     }
-    let phase = match args.phase {
-        PhaseName::Fibre => Phase::Fibre,
-        PhaseName::Velvet => Phase::Velvet,
-    };
-    let (tilt, spread) = (f64::from(args.tilt).to_radians(), f64::from(args.spread));
+    let mut how = FuzzOptions::default();
+    (how.tilt, how.spread, how.table) = (args.tilt, args.spread, args.table.is_some());
+    how.phase = args.phase;
     let busy = console.progress().busy("fitting");
-    // As typed, not as radians make it.
-    let fit = FuzzFit { tilt: args.tilt, ..fuzz_fit(phase, tilt, spread) };
-    let tabulated = match &args.table {
-        Some(path) => {
-            let tabulated = ambient_table(phase, tilt, spread);
-            outputs::make_place(path)?;
-            write_exr(path, &table_image(&tabulated)?)?;
-            Some(tabulated.ratio)
-        }
-        None => None,
-    };
+    let FittedFuzz { report, table, .. } = fuzz(&how)?;
+    if let (Some(path), Some(table)) = (&args.table, &table) {
+        outputs::make_place(path)?;
+        write_exr(path, table)?;
+    }
     if let Some(path) = &args.plots {
         outputs::make_place(path)?;
-        write_atomically(path, phase_plots(&fit).as_bytes())?;
+        write_atomically(path, phase_plots(&report.fit).as_bytes())?;
     }
     drop(busy);
-    let returned = fit.returned();
-    let mut warnings = Vec::new();
-    if returned > 1.0 {
-        let instead = match phase {
-            Phase::Fibre => "; take fibre_p_s in their place",
-            Phase::Velvet => "",
-        };
-        warnings.push(format!(
-            "the coefficients of p_s make energy: white fibres over white send back up to {returned:.3} of a light{instead}"
-        ));
-    }
-    let [low, high] = fit.ambient.ratio;
-    if tabulated.is_none() && (low < 1.0 - AMBIENT_OFF || high > 1.0 + AMBIENT_OFF) {
-        warnings.push(format!(
-            "the coefficients of ambient are {low:.2} to {high:.2} times what they stand for: fibres as combed as these need --table"
-        ));
-    }
-    let warning = (!warnings.is_empty()).then(|| warnings.join("; "));
-    let report = FuzzReport { fit, table: tabulated, returned, warning };
     match args.lang {
         // Constants are what was asked for, not a summary of it.
         Some(language) => Console { quiet: false, ..console.clone() }
-            .result(&report, &constants(&fit, report.warning.as_deref(), language)),
+            .result(&report, &constants(&report.fit, report.warning.as_deref(), language)),
         None => {
             let files = [("the table is in", &args.table), ("plots are in", &args.plots)];
             let files = files.into_iter().filter_map(|(what, path)| Some((what, path.as_ref()?)));
             let files: String = files.map(|(what, path)| format!("\n{what} {}", path.display())).collect();
-            console.result(&report, &(text(&fit, tabulated, report.warning.as_deref()) + &files))
+            console.result(&report, &(text(&report) + &files))
         }
     }
-}
-
-fn table_image(table: &AmbientTable) -> Result<Image, Error> {
-    let texels = table.texels.iter().flat_map(|&[thin, dense]| [thin, dense, 0.0]).collect();
-    Image::new(TABLE_SIZE as u32, TABLE_SIZE as u32, Channels::Rgb, Pixels::F32(texels))
-        .map_err(|e| Error::Internal(e.to_string()))
 }
 
 fn title(fit: &FuzzFit) -> String {
@@ -189,10 +132,10 @@ fn rows(fit: &FuzzFit) -> [(&'static str, Vec<f32>, [f32; 4]); 7] {
     ]
 }
 
-fn text(fit: &FuzzFit, tabulated: Option<[f32; 2]>, warning: Option<&str>) -> String {
+fn text(report: &FuzzReport) -> String {
     let header = ["", "error", "rms", "low", "high", "coefficients"].map(str::to_owned).to_vec();
     let mut cells = vec![header];
-    for (name, coefficients, [max, rms, low, high]) in rows(fit) {
+    for (name, coefficients, [max, rms, low, high]) in rows(&report.fit) {
         let coefficients: Vec<String> = coefficients.iter().map(|c| format!("{c:8.5}")).collect();
         let ratio = |x: f32| if name == "direction" { "-".to_owned() } else { format!("{x:.3}") };
         cells.push(vec![
@@ -207,12 +150,12 @@ fn text(fit: &FuzzFit, tabulated: Option<[f32; 2]>, warning: Option<&str>) -> St
     // Coefficients start in one column, whatever their number.
     let longest = cells.iter().map(|row| row[5].chars().count()).max().unwrap_or(0);
     cells.iter_mut().for_each(|row| row[5] = format!("{:<longest$}", row[5]));
-    let mut text = format!("{}\n\n{}", title(fit), table(&cells));
-    if let Some([low, high]) = tabulated {
+    let mut text = format!("{}\n\n{}", title(&report.fit), aligned(&cells));
+    if let Some([low, high]) = report.table {
         writeln!(text, "\ntable of the ambient factor: {low:.3} to {high:.3} of the exact value")
             .expect("strings grow");
     }
-    if let Some(warning) = warning {
+    if let Some(warning) = &report.warning {
         writeln!(text, "\nwarning: {warning}").expect("strings grow");
     }
     text += "

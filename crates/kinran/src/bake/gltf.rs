@@ -1,7 +1,7 @@
 //! A glTF file: its materials' textures are replaced by baked ones, everything else stays.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use kinran_bake::aniso::{Reflectance, RoughnessMaps, Sheet, SheetRequest, bake_surface_and_metal};
@@ -26,6 +26,7 @@ use super::together::{together, why_apart};
 use super::{curvature, file_name, file_stem, mip_texels, put_texture};
 use crate::content::Content;
 use crate::options::TextureOptions;
+use crate::outgoing::pack;
 use crate::report::{Input, Output, Report, SurfaceReport, WrittenFile};
 use crate::sink::place_in;
 use crate::{Error, Sink, Space, Stage, Task};
@@ -181,28 +182,6 @@ pub fn gltf(
     }
     report.write(out, &format!("{stem}.kinran.json"), written)?;
     Ok(report)
-}
-
-/// A document and the files that it takes along.
-struct Outgoing {
-    /// Names and contents, the document last.
-    files: Vec<(String, Vec<u8>)>,
-    /// What could not be cleaned up.
-    warnings: Vec<String>,
-}
-
-/// The document as it goes to its destination.
-fn pack(document: &Document, model: &str, out: &dyn Sink) -> Result<Outgoing, Error> {
-    let (packed, folder) = match out.place(model).filter(|_| out.is_on_disk()) {
-        Some(place) => (document.pack(&place)?, place.parent().map(Path::to_path_buf).unwrap_or_default()),
-        None => (document.pack_in_memory(model)?, PathBuf::new()),
-    };
-    let name = |path: &Path| {
-        let path = path.strip_prefix(&folder).unwrap_or(path);
-        path.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
-    };
-    let files = packed.files.into_iter().map(|(path, bytes)| (name(&path), bytes)).collect();
-    Ok(Outgoing { files, warnings: packed.warnings })
 }
 
 /// The textures that will be baked, before any is.

@@ -6,14 +6,13 @@ mod gltf;
 mod gltf_options;
 mod together;
 
-use std::path::Path;
-
-use kinran_image::{Format, Texture, encode_dds, encode_ktx2, full_level_count, level_size};
+use kinran_image::{Format, Texture, full_level_count, level_size};
 
 use crate::content::Content;
+use crate::names::file_name;
 use crate::options::TextureOptions;
 use crate::report::Output;
-use crate::{Error, Sink, Space};
+use crate::{Error, Sink, Space, textures};
 
 pub use kinran_bake::curvature::{BLUR, Method};
 pub use kinran_bake::folder::{Folder, FolderError, Green, Hints, Role, Row};
@@ -36,7 +35,7 @@ pub(crate) fn mip_texels((width, height): (u32, u32)) -> u64 {
     levels.map(|level| u64::from(level_size(width, level)) * u64::from(level_size(height, level))).sum()
 }
 
-/// Writes a texture in the containers asked for; gives the reports of the files.
+/// Writes a baked texture in the containers asked for; gives the reports of the files.
 pub(crate) fn put_texture(
     how: &TextureOptions,
     name: &str,
@@ -44,21 +43,8 @@ pub(crate) fn put_texture(
     mut texture: Texture,
     out: &dyn Sink,
 ) -> Result<Vec<Output>, Error> {
-    map.mark(&mut texture);
     texture.metadata.insert("KinranFilter".into(), how.filter.name().into());
-    how.container
-        .extensions()
-        .iter()
-        .map(|extension| {
-            let file = format!("{name}.{extension}");
-            let bytes = match *extension {
-                "dds" => encode_dds(&texture)?,
-                _ => encode_ktx2(&texture, (how.zstd > 0).then_some(how.zstd))?,
-            };
-            out.put(&file, &bytes)?;
-            Ok(Output::new(file, map, &texture, &bytes))
-        })
-        .collect()
+    textures::put_texture(how.container, how.zstd, name, map, texture, out)
 }
 
 /// A name that is a file's on every system: what is not a letter, digit, dash, dot or underscore becomes `_`.
@@ -67,9 +53,4 @@ pub fn file_stem(name: &str) -> String {
         name.chars().map(|c| if c.is_alphanumeric() || "-._".contains(c) { c } else { '_' }).collect();
     let stem = stem.trim_start_matches('.');
     if stem.is_empty() { "material".into() } else { stem.into() }
-}
-
-/// The last component of a path, as text.
-pub(crate) fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }

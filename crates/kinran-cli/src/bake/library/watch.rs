@@ -6,11 +6,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
-use kinran_bake::manifest::Manifest;
+use kinran::library::{Manifest, STATE};
 use notify::event::{AccessKind, AccessMode, EventKind};
 use notify::{Event, RecommendedWatcher, RecursiveMode, Watcher};
 
-use super::{Failures, STATE, build, cache_folder};
+use super::{Failures, build, cache_folder};
 use crate::bake::Args;
 use crate::{Console, Error};
 

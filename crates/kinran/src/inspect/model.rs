@@ -1,93 +1,130 @@
 //! What is inside a glTF file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use kinran_bake::aniso::RoughnessMaps;
 use kinran_bake::{NoSurface, material_surface};
-use kinran_image::{Pixels, full_level_count};
+use kinran_image::{Files, Pixels, full_level_count};
 use kinran_scene::{Document, LightKind, Material, Needs, Scene, TextureRef};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::model::{ModelArgs, read_scene};
-use crate::render::triangles;
-use crate::table::list;
-use crate::values::counted;
-use crate::view::file_name;
-use crate::{Console, Error, outputs};
-use kinran::bake::texel_remarks;
+use super::{counted, file_name};
+use crate::bake::texel_remarks;
+use crate::{Error, Stage, Task};
 
-#[derive(Serialize, JsonSchema)]
-pub(crate) struct Report {
-    file: String,
-    kind: &'static str,
-    triangles: usize,
-    instances: usize,
-    primitives: Vec<PrimitiveReport>,
-    materials: Vec<MaterialReport>,
-    cameras: Vec<CameraReport>,
-    lights: Vec<&'static str>,
-    extensions_used: Vec<String>,
-    extensions_required: Vec<String>,
-    warnings: Vec<String>,
+/// What is in a model.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ModelReport {
+    /// The file's name.
+    pub file: String,
+    /// `model`.
+    pub kind: &'static str,
+    /// Triangles of all instances.
+    pub triangles: usize,
+    /// How often primitives are drawn.
+    pub instances: usize,
+    /// Its primitives.
+    pub primitives: Vec<PrimitiveReport>,
+    /// Its materials.
+    pub materials: Vec<MaterialReport>,
+    /// Its cameras.
+    pub cameras: Vec<CameraReport>,
+    /// Its lights: `directional`, `point` or `spot`.
+    pub lights: Vec<&'static str>,
+    /// Extensions that it says it uses.
+    pub extensions_used: Vec<String>,
+    /// Those without which it cannot be read.
+    pub extensions_required: Vec<String>,
+    /// What is doubtful about it, a sentence each.
+    pub warnings: Vec<String>,
 }
 
-#[derive(Serialize, JsonSchema)]
-struct PrimitiveReport {
-    triangles: usize,
-    vertices: usize,
-    instances: usize,
-    uv_sets: usize,
-    material: String,
+/// A primitive of a mesh.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct PrimitiveReport {
+    /// Its triangles.
+    pub triangles: usize,
+    /// Its vertices.
+    pub vertices: usize,
+    /// How often it is drawn.
+    pub instances: usize,
+    /// Its sets of texture coordinates.
+    pub uv_sets: usize,
+    /// Its material's name.
+    pub material: String,
 }
 
-#[derive(Serialize, JsonSchema)]
-struct MaterialReport {
-    name: String,
-    maps: Vec<MapReport>,
+/// A material.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct MaterialReport {
+    /// Its name.
+    pub name: String,
+    /// Its textures.
+    pub maps: Vec<MapReport>,
     /// What `kinran bake` does with it.
-    bake: String,
+    pub bake: String,
     /// Extensions that neither change the bake nor the picture.
-    ignored_extensions: Vec<String>,
+    pub ignored_extensions: Vec<String>,
 }
 
-#[derive(Serialize, JsonSchema)]
-struct MapReport {
-    slot: &'static str,
-    width: u32,
-    height: u32,
-    channels: usize,
-    bits: u32,
-    uv_set: usize,
+/// A texture of a material.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct MapReport {
+    /// What it stands for, as glTF calls it without "Texture".
+    pub slot: &'static str,
+    /// Texels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Its channels.
+    pub channels: usize,
+    /// Bits of a sample.
+    pub bits: u32,
+    /// Which texture coordinates it is laid by.
+    pub uv_set: usize,
     /// The KTX2 or DDS file with its mips.
     #[serde(skip_serializing_if = "Option::is_none")]
-    runtime: Option<RuntimeReport>,
+    pub runtime: Option<RuntimeReport>,
 }
 
-#[derive(Serialize, JsonSchema)]
-struct RuntimeReport {
+/// The mips of a texture of a material.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct RuntimeReport {
     /// The image's URI; an image in a buffer has none.
     #[serde(skip_serializing_if = "Option::is_none")]
-    file: Option<String>,
-    format: String,
-    levels: usize,
+    pub file: Option<String>,
+    /// Its texel format.
+    pub format: String,
+    /// How many levels it has.
+    pub levels: usize,
     /// The filter that kinran made the mips with.
     #[serde(skip_serializing_if = "Option::is_none")]
-    filter: Option<String>,
+    pub filter: Option<String>,
 }
 
-#[derive(Serialize, JsonSchema)]
-struct CameraReport {
-    position: [f32; 3],
-    yfov_degrees: f32,
+/// A camera.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct CameraReport {
+    /// Where it stands, metres.
+    pub position: [f32; 3],
+    /// From the lower edge of its picture to the upper one.
+    pub yfov_degrees: f32,
 }
 
-pub(super) fn inspect(path: &Path, args: &ModelArgs, console: &Console) -> Result<(), Error> {
-    let scene = read_scene(path, args, &Needs::ALL, &console.progress())?;
+pub(super) fn inspect(
+    files: &dyn Files,
+    path: &Path,
+    allowed: &[PathBuf],
+    task: Task<'_>,
+) -> Result<ModelReport, Error> {
+    let reading = task.begin(Stage::Reading, file_name(path), 0)?;
+    let expect = |units| reading.expect(units);
+    let scene = Scene::load_in(files, path, allowed, &Needs::ALL, &expect, &|units| reading.tick(units))?;
+    drop(reading);
     // An OBJ has no document, and no extensions.
-    let is_obj = outputs::has_extension(path, "obj");
-    let allowed = args.allowed()?;
-    let document = (!is_obj).then(|| Document::open_allowing(path, allowed)).transpose()?;
+    let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+    let document = (!is_obj).then(|| Document::open_in(files, path, allowed)).transpose()?;
     let strings = |key: &str| -> Vec<String> {
         let values = document.as_ref().and_then(|d| d.json().get(key)?.as_array());
         values.into_iter().flatten().filter_map(|v| v.as_str().map(str::to_owned)).collect()
@@ -116,10 +153,10 @@ pub(super) fn inspect(path: &Path, args: &ModelArgs, console: &Console) -> Resul
         LightKind::Point => "point",
         LightKind::Spot { .. } => "spot",
     });
-    let report = Report {
+    Ok(ModelReport {
         file: file_name(path),
         kind: "model",
-        triangles: triangles(&scene),
+        triangles: scene.instances.iter().map(|i| scene.primitives[i.primitive].triangles.len()).sum(),
         instances: scene.instances.len(),
         primitives: primitives.collect(),
         materials: materials.collect(),
@@ -128,9 +165,7 @@ pub(super) fn inspect(path: &Path, args: &ModelArgs, console: &Console) -> Resul
         extensions_used: strings("extensionsUsed"),
         extensions_required: strings("extensionsRequired"),
         warnings: scene.warnings.iter().cloned().chain(remarks).collect(),
-    };
-    let text = text(&report);
-    console.result(&super::Report::Model(report), &text)
+    })
 }
 
 fn maps(scene: &Scene, document: Option<&Document>, m: &Material) -> Vec<MapReport> {
@@ -180,15 +215,6 @@ fn maps(scene: &Scene, document: Option<&Document>, m: &Material) -> Vec<MapRepo
     slots.into_iter().filter_map(report).collect()
 }
 
-impl RuntimeReport {
-    fn text(&self) -> String {
-        let file = self.file.as_deref().unwrap_or("the file");
-        let filter = self.filter.as_ref().map_or_else(String::new, |filter| format!(", filter {filter}"));
-        let levels = counted(self.levels, "level", "levels");
-        format!("; mips in {file}: {}, {levels}{filter}", self.format)
-    }
-}
-
 /// What `kinran bake` does with a material, in words.
 fn bake(scene: &Scene, material: usize) -> String {
     match material_surface(scene, material) {
@@ -209,51 +235,4 @@ fn bake(scene: &Scene, material: usize) -> String {
         Err(NoSurface::Plain) => "nothing: it has no normal or roughness map and is isotropic".into(),
         Err(NoSurface::Apart(reason)) => format!("nothing: {reason}"),
     }
-}
-
-fn text(report: &Report) -> String {
-    let row = |name: &str, value: String| vec![name.to_owned(), value];
-    let or_none = |values: &[String]| if values.is_empty() { "none".into() } else { values.join(", ") };
-    let mut facts = vec![
-        row("file", report.file.clone()),
-        row(
-            "triangles",
-            format!("{} in {}", report.triangles, counted(report.instances, "instance", "instances")),
-        ),
-        row("extensions", or_none(&report.extensions_used)),
-    ];
-    if !report.extensions_required.is_empty() {
-        facts.push(row("required", or_none(&report.extensions_required)));
-    }
-    if !report.lights.is_empty() {
-        facts.push(row("lights", report.lights.join(", ")));
-    }
-    facts.extend(report.cameras.iter().enumerate().map(|(i, camera)| {
-        let [x, y, z] = camera.position;
-        row(&format!("camera {i}"), format!("at {x:.3}, {y:.3}, {z:.3}, {:.1} degrees", camera.yfov_degrees))
-    }));
-    facts.extend(report.warnings.iter().map(|warning| row("warning", warning.clone())));
-
-    let headings = ["primitive", "triangles", "vertices", "instances", "UV sets", "material"];
-    let mut primitives = vec![headings.map(str::to_owned).to_vec()];
-    primitives.extend(report.primitives.iter().enumerate().map(|(i, p)| {
-        let numbers = [i, p.triangles, p.vertices, p.instances, p.uv_sets].map(|n| n.to_string());
-        [&numbers[..], std::slice::from_ref(&p.material)].concat()
-    }));
-
-    let mut text = format!("{}\n{}", list(&facts), list(&primitives));
-    for m in &report.materials {
-        let mut rows = vec![row("  bake", m.bake.clone())];
-        rows.extend(m.maps.iter().map(|map| {
-            let MapReport { slot, width, height, channels, bits, uv_set, runtime } = map;
-            let mips = runtime.as_ref().map_or_else(String::new, RuntimeReport::text);
-            let text = format!("{width}x{height}, {channels} x {bits} bits, UV set {uv_set}{mips}");
-            row(&format!("  {slot}"), text)
-        }));
-        if !m.ignored_extensions.is_empty() {
-            rows.push(row("  ignored", m.ignored_extensions.join(", ")));
-        }
-        text += &format!("\nmaterial {}\n{}", m.name, list(&rows));
-    }
-    text
 }

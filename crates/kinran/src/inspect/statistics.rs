@@ -5,14 +5,17 @@ use kinran_shading::{aniso_decode_matrix, normal_from_xy};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use kinran::content::Content;
+use crate::content::Content;
 
 /// The smallest, the average and the largest value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub(crate) struct Range {
-    pub(crate) min: f32,
-    pub(crate) mean: f32,
-    pub(crate) max: f32,
+pub struct Range {
+    /// The smallest.
+    pub min: f32,
+    /// The mean.
+    pub mean: f32,
+    /// The largest.
+    pub max: f32,
 }
 
 impl Range {
@@ -26,17 +29,13 @@ impl Range {
         }
         (count > 0).then(|| Range { min, mean: (sum / count as f64) as f32, max })
     }
-
-    /// Minimum, mean and maximum as cells.
-    pub(crate) fn cells(self) -> [String; 3] {
-        [self.min, self.mean, self.max].map(|v| format!("{v:.4}"))
-    }
 }
 
 /// What is worth knowing about one level, by what the map holds.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
-pub(crate) enum Statistics {
+pub enum Statistics {
+    /// Of tangent-space normals.
     Normal {
         /// Length of the average of all normals, 1 where all are the same.
         average_length: f32,
@@ -45,22 +44,36 @@ pub(crate) enum Statistics {
         /// Share of texels whose x and y are longer than 1.
         outside_share: f32,
     },
+    /// Of an aniso map.
     Aniso {
+        /// GGX roughness along the direction.
         alpha_t: Range,
+        /// GGX roughness across it.
         alpha_b: Range,
+        /// Deviation of directions: 0 where all are parallel, 40.5 where there is none in particular.
         direction_spread_degrees: Option<f32>,
     },
+    /// Of a roughness map.
     Roughness {
+        /// Perceptual roughness.
         roughness: Range,
     },
+    /// Of a map for `KHR_materials_anisotropy`.
     Anisotropy {
+        /// Strength of anisotropy.
         strength: Range,
+        /// As of an aniso map.
         direction_spread_degrees: Option<f32>,
     },
+    /// Of any other.
     Channels {
+        /// Red.
         red: Range,
+        /// Green.
         green: Range,
+        /// Blue.
         blue: Range,
+        /// Alpha.
         alpha: Range,
     },
 }
@@ -107,74 +120,6 @@ impl Statistics {
                 alpha: channel(3)?,
             },
         })
-    }
-
-    /// Headings of [`Statistics::cells`].
-    pub(crate) fn headings(&self) -> &'static [&'static str] {
-        match self {
-            Statistics::Normal { .. } => &["length", "tilt min", "mean", "max deg", "outside %"],
-            Statistics::Aniso { .. } => {
-                &["alpha_t min", "mean", "max", "alpha_b min", "mean", "max", "spread deg"]
-            }
-            Statistics::Roughness { .. } => &["roughness min", "mean", "max"],
-            Statistics::Anisotropy { .. } => &["strength min", "mean", "max", "spread deg"],
-            Statistics::Channels { .. } => &[
-                "red min",
-                "mean",
-                "max",
-                "green min",
-                "mean",
-                "max",
-                "blue min",
-                "mean",
-                "max",
-                "alpha min",
-                "mean",
-                "max",
-            ],
-        }
-    }
-
-    /// What of the headings needs words; empty where they say it.
-    pub(crate) fn legend(&self) -> &'static str {
-        match self {
-            Statistics::Normal { .. } => {
-                "length: of the mean of all normals, 1 where they are one; tilt: their angle from flat; outside: texels whose \
-                 x and y alone are longer than 1\n"
-            }
-            Statistics::Aniso { .. } => {
-                "alpha_t, alpha_b: GGX roughness along and across the direction; spread: of directions, 40.5 where there is \
-                 none in particular\n"
-            }
-            Statistics::Anisotropy { .. } => {
-                "spread: of directions, 40.5 where there is none in particular\n"
-            }
-            Statistics::Roughness { .. } | Statistics::Channels { .. } => "",
-        }
-    }
-
-    /// The numbers as text.
-    pub(crate) fn cells(&self) -> Vec<String> {
-        let spread = |degrees: Option<f32>| degrees.map_or("-".into(), |d| format!("{d:.2}"));
-        match *self {
-            Statistics::Normal { average_length, tilt_degrees: tilt, outside_share } => vec![
-                format!("{average_length:.4}"),
-                format!("{:.2}", tilt.min),
-                format!("{:.2}", tilt.mean),
-                format!("{:.2}", tilt.max),
-                format!("{:.2}", outside_share * 100.0),
-            ],
-            Statistics::Aniso { alpha_t, alpha_b, direction_spread_degrees } => {
-                [&alpha_t.cells()[..], &alpha_b.cells(), &[spread(direction_spread_degrees)]].concat()
-            }
-            Statistics::Roughness { roughness } => roughness.cells().to_vec(),
-            Statistics::Anisotropy { strength, direction_spread_degrees } => {
-                [&strength.cells()[..], &[spread(direction_spread_degrees)]].concat()
-            }
-            Statistics::Channels { red, green, blue, alpha } => {
-                [red.cells(), green.cells(), blue.cells(), alpha.cells()].concat()
-            }
-        }
     }
 }
 

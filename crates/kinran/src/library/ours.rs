@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use kinran_bake::cache::Cache;
 
-use super::STATE;
+/// The folder in the output with what is known of it.
+pub const STATE: &str = ".kinran";
 
 /// The folders and files that belong to the program.
 pub(super) struct Ours {

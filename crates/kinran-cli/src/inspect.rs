@@ -1,22 +1,19 @@
 //! `kinran inspect`: what is inside a texture, a model, an image or a report.
 
-mod image;
-mod model;
-mod report;
-mod statistics;
-mod texture;
+mod words;
 
 use std::path::{Path, PathBuf};
 
 use kinran::content::Content;
+use kinran::inspect::{InspectOptions, Inspected, inspect};
 use kinran::{Disk, Finding};
-use kinran_image::{IMAGE_EXTENSIONS, has_image_extension};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::ModelArgs;
+use crate::progress::Bars;
 use crate::view::file_name;
-use crate::{Console, Error, outputs};
+use crate::{Console, Error};
 
 /// Tells what is in a texture, a model, an image or a report
 ///
@@ -58,14 +55,11 @@ pub struct Args {
     pub model: ModelArgs,
 }
 
-/// What is in a file; `kind` says which of these.
+/// What is in a file, or whether it is sound; `kind` says which.
 #[derive(Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum Report {
-    Texture(texture::Report),
-    Model(model::Report),
-    Image(image::Report),
-    Written(report::Report),
+    Inside(Inspected),
     Check(CheckReport),
 }
 
@@ -98,33 +92,17 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if args.check {
         return check(&args.file, console);
     }
-    let is = |extensions: &[&str]| extensions.iter().any(|e| outputs::has_extension(&args.file, e));
-    if is(&["ktx2", "dds"]) {
-        return texture::inspect(&args.file, args.role, console);
-    }
-    if args.file.is_dir() {
-        return Err(Error::file_error(&args.file, "is a folder; name a file in it"));
-    }
-    if let Some(role) = args.role {
-        let reason = "only textures have a role; leave the flag out";
-        return Err(Error::flag_error_of(&args.file, format!("--role {}", role.name()), reason));
-    }
-    if let Some(layer) = args.exr_layer.as_ref().filter(|_| !is(&["exr"])) {
-        let reason = "only EXR files have layers; leave the flag out";
-        return Err(Error::flag_error_of(&args.file, format!("--exr-layer {layer}"), reason));
-    }
-    if kinran_scene::is_gltf(&args.file) || is(&["obj"]) {
-        model::inspect(&args.file, &args.model, console)
-    } else if has_image_extension(&args.file) {
-        image::inspect(&args.file, args.exr_layer.as_deref(), console)
-    } else if is(&["json"]) {
-        report::inspect(&args.file, console)
-    } else {
-        let reason = format!(
-            "this kind of file is not known; give a .glb, .gltf, .obj, a report of kinran (.json), a texture or an image \
-             (.{})",
-            IMAGE_EXTENSIONS.join(", .")
-        );
-        Err(Error::file_error(&args.file, reason))
-    }
+    let mut how = InspectOptions::default();
+    (how.role, how.exr_layer) = (args.role, args.exr_layer.clone());
+    how.allow_outside = args.model.allowed()?.to_vec();
+    let bars = Bars::new(console.progress());
+    let inspected = inspect(&Disk, &args.file, &how, bars.task())?;
+    let text = match &inspected {
+        Inspected::Texture(report) => words::texture(report),
+        Inspected::Model(report) => words::model(report),
+        Inspected::Image(report) => words::image(report),
+        Inspected::Written(report) => words::written(report),
+        other => format!("{other:?}"),
+    };
+    console.result(&Report::Inside(inspected), &text)
 }

@@ -3,54 +3,64 @@
 use std::path::Path;
 
 use glam::{Vec3, Vec4};
-use kinran_image::{Channels, Image, Pixels, read_layer};
+use kinran_image::{Channels, Files, Image, Pixels, decode_layer};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::statistics::Range;
-use crate::table::{list, table};
-use crate::values::counted;
-use crate::view::file_name;
-use crate::{Console, Error};
+use super::{file_name, read};
+use crate::Error;
 
 /// A normal's length may be off by this much: three steps of 8 bits.
-const LENGTH_TOLERANCE: f32 = 3.0 * 2.0 / 255.0;
+pub const LENGTH_TOLERANCE: f32 = 3.0 * 2.0 / 255.0;
 
-#[derive(Serialize, JsonSchema)]
-pub(crate) struct Report {
-    file: String,
-    kind: &'static str,
-    width: u32,
-    height: u32,
-    bits: u32,
-    float: bool,
+/// What is in an image.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ImageReport {
+    /// The file's name.
+    pub file: String,
+    /// `image`.
+    pub kind: &'static str,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Bits of a sample.
+    pub bits: u32,
+    /// Whether samples are floats.
+    pub float: bool,
     /// How red, green and blue are encoded if they are colour: `linear`, `srgb`, or `unsaid`, which is sRGB for colour.
-    transfer: String,
+    pub transfer: String,
     /// What was chosen or left out when it was read.
-    notes: Vec<String>,
-    channels: Vec<ChannelReport>,
+    pub notes: Vec<String>,
+    /// Its channels.
+    pub channels: Vec<ChannelReport>,
     /// Of images that look like a normal map.
     #[serde(skip_serializing_if = "Option::is_none")]
-    normal_map: Option<NormalReport>,
+    pub normal_map: Option<NormalReport>,
 }
 
-#[derive(Serialize, JsonSchema)]
-struct ChannelReport {
-    name: &'static str,
+/// A channel of an image.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ChannelReport {
+    /// `grey`, `red`, `green`, `blue` or `alpha`.
+    pub name: &'static str,
+    /// Its samples, integers from 0 to 1.
     #[serde(flatten)]
-    range: Range,
+    pub range: Range,
 }
 
-#[derive(Serialize, JsonSchema)]
-struct NormalReport {
+/// What looks like a normal map.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct NormalReport {
     /// Share of texels whose length is not 1.
-    not_unit_share: f32,
+    pub not_unit_share: f32,
     /// Share of texels that point below the surface.
-    below_share: f32,
+    pub below_share: f32,
 }
 
-pub(super) fn inspect(path: &Path, layer: Option<&str>, console: &Console) -> Result<(), Error> {
-    let image = read_layer(path, layer)?;
+pub(super) fn inspect(files: &dyn Files, path: &Path, layer: Option<&str>) -> Result<ImageReport, Error> {
+    let image = decode_layer(path, &read(files, path)?, layer)?;
     let (bits, float) = match image.pixels {
         Pixels::U8(_) => (8, false),
         Pixels::U16(_) => (16, false),
@@ -66,7 +76,7 @@ pub(super) fn inspect(path: &Path, layer: Option<&str>, console: &Console) -> Re
         let range = Range::of(texels(&image).map(|t| t[i]))?;
         Some(ChannelReport { name, range })
     };
-    let report = Report {
+    Ok(ImageReport {
         file: file_name(path),
         kind: "image",
         width: image.width,
@@ -77,9 +87,7 @@ pub(super) fn inspect(path: &Path, layer: Option<&str>, console: &Console) -> Re
         notes: image.notes.clone(),
         channels: names.iter().filter_map(channel).collect(),
         normal_map: normal_report(&image),
-    };
-    let text = text(&report);
-    console.result(&super::Report::Image(report), &text)
+    })
 }
 
 fn texels(image: &Image) -> impl Iterator<Item = Vec4> {
@@ -106,45 +114,4 @@ fn normal_report(image: &Image) -> Option<NormalReport> {
         not_unit_share: share(&|n| (n.length() - 1.0).abs() > LENGTH_TOLERANCE),
         below_share: share(&|n| n.z < -LENGTH_TOLERANCE),
     })
-}
-
-fn text(report: &Report) -> String {
-    let row = |name: &str, value: String| vec![name.to_owned(), value];
-    let kind = if report.float { "floats" } else { "integers" };
-    let mut facts = vec![
-        row("file", report.file.clone()),
-        row("size", format!("{}x{}", report.width, report.height)),
-        row(
-            "samples",
-            format!(
-                "{} of {}-bit {kind}",
-                counted(report.channels.len(), "channel", "channels"),
-                report.bits
-            ),
-        ),
-    ];
-    let color = match report.transfer.as_str() {
-        "unsaid" => "sRGB, if it is colour",
-        "srgb" => "sRGB, as the file says",
-        _ => "linear",
-    };
-    facts.push(row("colour", color.into()));
-    facts.extend(report.notes.iter().map(|note| row("note", note.clone())));
-    if let Some(normals) = &report.normal_map {
-        let percent = |share: f32| format!("{:.2} %", share * 100.0);
-        facts.push(row(
-            "normals",
-            format!(
-                "{} of texels are more than {LENGTH_TOLERANCE} off unit length, {} point below the surface",
-                percent(normals.not_unit_share),
-                percent(normals.below_share)
-            ),
-        ));
-    }
-    let mut rows = vec![["channel", "min", "mean", "max"].map(str::to_owned).to_vec()];
-    rows.extend(report.channels.iter().map(|channel| {
-        let [min, mean, max] = channel.range.cells();
-        vec![channel.name.to_owned(), min, mean, max]
-    }));
-    format!("{}\n{}", list(&facts), table(&rows))
 }

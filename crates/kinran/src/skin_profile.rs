@@ -1,13 +1,15 @@
 //! A diffusion profile from a file.
 
+use std::io::ErrorKind;
 use std::path::Path;
 
 use kinran_bake::skin_lut::Profile;
+use kinran_image::Files;
 use kinran_shading::skin::profile::Gaussian;
 use serde::Deserialize;
 
 use crate::Error;
-use crate::outputs::has_extension;
+use crate::error::InputFault;
 
 /// Longest file that is read: some 30 000 rows.
 const BYTES_MAX: u64 = 1 << 20;
@@ -29,25 +31,26 @@ struct Entry {
 ///
 /// # Errors
 /// Names file, line and what should stand there.
-pub(super) fn read(path: &Path) -> Result<Profile, Error> {
+pub(crate) fn read(files: &dyn Files, path: &Path) -> Result<Profile, Error> {
     let io = |e| Error::from(kinran_image::Error::io(path, e));
-    if std::fs::metadata(path).map_err(io)?.len() > BYTES_MAX {
-        return Err(Error::file_error(
-            path,
-            "is larger than 1 MiB, so no profile; name a .csv or .json of one",
-        ));
+    let refused = |fault| Err(Error::Input { path: path.into(), fault });
+    if files.size(path).is_some_and(|bytes| bytes > BYTES_MAX) {
+        return refused(InputFault::LargeProfile);
     }
-    let text = std::fs::read_to_string(path).map_err(io)?;
-    if has_extension(path, "json") {
-        let sum: Sum = serde_json::from_str(&text).map_err(|e| {
-            let fix = "write { \"gaussians\": [ { \"variance\": 1, \"weight\": [1, 1, 1] } ] }";
-            Error::file_error(path, format!("{e}; {fix}"))
-        })?;
+    let is = |extension: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
+    let text = String::from_utf8(files.read(path).map_err(io)?);
+    let text = text
+        .map_err(|_| io(std::io::Error::new(ErrorKind::InvalidData, "stream did not contain valid UTF-8")))?;
+    if is("json") {
+        let sum: Sum = match serde_json::from_str(&text) {
+            Ok(sum) => sum,
+            Err(error) => return refused(InputFault::NoGaussians(error.to_string())),
+        };
         let sum = sum.gaussians.iter().map(|g| Gaussian { variance: g.variance, weight: g.weight });
         return Ok(Profile::Gaussians(sum.collect()));
     }
-    if !has_extension(path, "csv") {
-        return Err(Error::file_error(path, "a profile's file ends in .csv or .json; rename it"));
+    if !is("csv") {
+        return refused(InputFault::NoProfile);
     }
     let mut rows = Vec::new();
     for (i, line) in text.lines().enumerate() {
@@ -62,9 +65,7 @@ pub(super) fn read(path: &Path) -> Result<Profile, Error> {
             // The first line may name the columns.
             Err(_) if rows.is_empty() && i == 0 => {}
             _ => {
-                let reason =
-                    format!("line {}: \"{line}\" is no row; write distance in mm, red, green, blue", i + 1);
-                return Err(Error::file_error(path, reason));
+                return refused(InputFault::NoRow { line: i + 1, text: line.into() });
             }
         }
     }
