@@ -579,11 +579,12 @@ pub fn texel_remarks(
 
 /// What the texels of a normal map say against it.
 fn normal_remarks(name: &str, image: &Image, said: Option<Green>) -> Vec<String> {
-    // Engine textures may hold red and green alone.
-    if let Some(why) = not_normals(image).filter(|_| image.channels != Channels::Rg) {
-        return vec![format!(
-            "its normal map \"{name}\" does not look like one: {why}; it is taken as it is"
-        )];
+    let unlike = || {
+        let why = not_normals(image)?;
+        Some(format!("its normal map \"{name}\" does not look like one: {why}; it is taken as it is"))
+    };
+    if image.channels == Channels::R {
+        return unlike().into_iter().collect();
     }
     let guess = guess_green(image);
     let green = match (guess, said) {
@@ -604,7 +605,9 @@ fn normal_remarks(name: &str, image: &Image, said: Option<Green>) -> Vec<String>
     });
     let below = below_surface(image)
         .map(|below| format!("its normal map \"{name}\": {below}; they are laid on the surface"));
-    green.map(str::to_owned).into_iter().chain(lengths).chain(below).collect()
+    // Of lengths it is told above, and engine textures may hold red and green alone.
+    let unlike = if lengths.is_some() || image.channels == Channels::Rg { None } else { unlike() };
+    green.map(str::to_owned).into_iter().chain(lengths).chain(below).chain(unlike).collect()
 }
 
 /// What makes two materials' surfaces the same.
