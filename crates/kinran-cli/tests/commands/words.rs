@@ -1,5 +1,8 @@
 //! Words that people read: of files that are not there, of what cannot be read, of one and of several.
 
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+
 use kinran_image::{Channels, Image, Pixels, write_png};
 
 use crate::common::{bumps, glb, kinran, refused, square, text};
@@ -156,4 +159,22 @@ fn a_report_lies_nobody_knows_where() {
     let said = kinran(&[&["detail", "report", text(&library), "-o", text(&out)], &few[..]].concat());
     let wanted = format!("wrote {}, ", out.join("index.html").display());
     assert!(said.out.contains(&wanted), "wanted {wanted} in {}{}", said.out, said.err);
+}
+
+/// Whoever reads a log knows after a few seconds what is being done, and how far it is.
+#[test]
+fn a_pipe_hears_nothing_of_long_work_or_sees_bars() {
+    let (folder, model) = square();
+    let picture = folder.path().join("p.png");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_kinran"))
+        .args(["render", text(&model), "-o", text(&picture), "--size", "512", "--spp", "1000000"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(child.stderr.take().unwrap()).read_line(&mut line).unwrap();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(line.starts_with("render: ") && line.contains(" %, ") && !line.contains('\u{1b}'), "{line:?}");
 }
