@@ -2,22 +2,24 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use kinran_bake::aniso::Filter;
 use kinran_image::write_atomically;
-use kinran_render::metrics::{flip, rmse_linear, rmse_srgb8};
-use kinran_render::reference::{Film, RenderScene, SurfaceTextures, TextureFiltering};
+use kinran_render::metrics::{flip, relative_l2, rmse_linear, rmse_srgb8};
+use kinran_render::reference::{Film, RenderScene, ShadingRate, SurfaceTextures, TextureFiltering};
 use kinran_scene::{Needs, Scene};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::budget::{Budget, Shares};
 use crate::compare_sheet::{comparison_sheet, distance_sheet};
 use crate::model::{model_at, read_scene};
 use crate::picture::Picture;
 use crate::ranking::{Errors, FLIP_BEND, Order, order};
-use crate::surfaces::{Mips, scene_surfaces};
+use crate::surfaces::{Method, Mips, has_mixed, scene_surfaces};
 use crate::table::table;
-use crate::values::{counted, filter, number};
+use crate::values::{Choices, SWITCH, choice, counted, number};
 use crate::view::{Samples, View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, outputs};
 
@@ -25,8 +27,9 @@ use crate::{Console, Error, Progress, outputs};
 ///
 /// Draws the model with the mips of each filter, as a GPU would sample them after block compression, and
 /// with many samples of level 0 alone, which is ground truth; nearby and from farther and farther away.
-/// Under each picture stand the root mean square error (display-encoded, white being 1) and the mean FLIP
-/// error (Andersson et al. 2020, 67 pixels per degree). All pictures have noise: a filter is marked as the
+/// Under each picture stand the root mean square error (display-encoded, white being 1), the mean FLIP error
+/// (Andersson et al. 2020, 67 pixels per degree) and L2, the relative error in linear light; the tables have
+/// each of them also of both pictures shrunk to a quarter. All pictures have noise: a filter is marked as the
 /// nearest where it leads by more than noise explains, and a sentence for each distance says what is known.
 ///
 /// The folder then holds compare.png (side by side, with maps of the FLIP error), distance.png (a row
@@ -34,8 +37,8 @@ use crate::{Console, Error, Progress, outputs};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinran compare lamp.glb -o comparison/
-  kinran compare lamp.glb -o comparison/ --filters ml,naive \\
-      --truth-spp 1024 --distances 1,4,16
+  kinran compare lamp.glb -o comparison/ --filters ml,ml-apart,naive \\
+      --budget --truth-spp 1024 --distances 1,4,16
   kinran compare cloth.glb -o comparison/ --env none \\
       --light 1,1,1 --size 640x480 --json")]
 pub struct Args {
@@ -47,10 +50,15 @@ pub struct Args {
     #[arg(long, short, value_name = "DIR")]
     pub output: Option<PathBuf>,
 
-    /// Filters, in the order of the columns
+    /// Filters, in the order of the columns; ml-apart is ml with colour, metalness and lobe filtered each by itself, and so on
     #[arg(long, value_name = "A,B,C", value_delimiter = ',', default_value = "ml,linear,lean,naive",
-        value_parser = filter())]
-    pub filters: Vec<Filter>,
+        value_parser = method())]
+    pub filters: Vec<Method>,
+
+    /// Where filters' pictures are shaded: once for a pixel, at its centre, samples telling what covers it, as games do it with
+    /// multisampling; or at every sample, which blurs textures a second time
+    #[arg(long, value_name = "WHERE", default_value = "pixel", value_parser = choice(SHADING))]
+    pub shading: ShadingRate,
 
     /// Samples in a pixel of the filters' pictures at distance 1; farther away they have as many times more
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 16))]
@@ -74,16 +82,40 @@ pub struct Args {
         value_parser = |t: &str| number(t, 1.0..=64.0))]
     pub distances: Vec<f32>,
 
+    /// Filters colour, metalness and lobe together, so that what reflects and what scatters stays from afar; off averages each
+    /// by itself
+    #[arg(long, value_name = "WHETHER", action = clap::ArgAction::Set, default_value = "on", value_parser = choice(SWITCH))]
+    pub correlated: bool,
+
+    /// Tells what each filter's error is made of: the sampler's kernel, colour apart from lobe, the lobe, compression, noise
+    #[arg(long)]
+    pub budget: bool,
+
     #[command(flatten)]
     #[allow(missing_docs)]
     pub view: ViewArgs,
 }
 
+/// Where a pixel is shaded.
+const SHADING: &Choices<ShadingRate> =
+    &[(ShadingRate::Pixel, "pixel", ""), (ShadingRate::Sample, "sample", "")];
+
+/// Takes a filter by its name, or by that with `-apart`.
+fn method() -> impl TypedValueParser<Value = Method> {
+    let all = || [true, false].into_iter().flat_map(|on| Filter::ALL.map(|filter| Method::new(filter, on)));
+    let names = distinct(&all().map(Method::name).collect::<Vec<_>>());
+    PossibleValuesParser::new(names)
+        .map(move |name| all().find(|method| method.name() == name).expect("only names pass"))
+}
+
 /// What is compared, and how carefully.
 #[derive(Clone)]
 pub struct Options {
-    /// The filters, in the order of the columns.
-    pub filters: Vec<Filter>,
+    /// The filters, in the order of the columns. Where no material's maps can be filtered together, a filter that comes with and
+    /// without that is drawn once.
+    pub methods: Vec<Method>,
+    /// Where the filters' pictures are shaded; ground truth is shaded at every sample.
+    pub shading: ShadingRate,
     /// Samples in a pixel of the filters' pictures at distance 1; farther away as many times more.
     pub samples_per_pixel: u32,
     /// The same for ground truth.
@@ -95,8 +127,17 @@ pub struct Options {
     pub max_anisotropy: u32,
     /// Factors of distance besides 1, each 1 or more.
     pub distances: Vec<f32>,
+    /// Whether errors are split into what they are made of; takes about as long again.
+    pub budget: bool,
     /// Camera and light at distance 1.
     pub view: View,
+}
+
+impl Options {
+    /// How textures of filters are read.
+    fn filtering(&self) -> TextureFiltering {
+        TextureFiltering::Mips { max_anisotropy: self.max_anisotropy }
+    }
 }
 
 /// How far a picture is from ground truth.
@@ -112,9 +153,27 @@ pub struct Difference {
     pub rmse: f64,
     /// Of linear radiance.
     pub rmse_linear: f64,
+    /// The same relative to ground truth's root mean square.
+    pub l2: f64,
     /// Mean LDR-FLIP.
     pub flip: f32,
+    /// Errors of both pictures shrunk: of what does not hang on single pixels.
+    pub shrunk: Shrunk,
 }
+
+/// How far a picture is from ground truth where both are shrunk to a quarter of their width and height, in linear light.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Shrunk {
+    /// As [`Difference::rmse`].
+    pub rmse: f64,
+    /// As [`Difference::l2`].
+    pub l2: f64,
+    /// As [`Difference::flip`].
+    pub flip: f32,
+}
+
+/// How far pictures are shrunk for [`Shrunk`]: chosen by eye, several times the width of the sampler's kernel.
+const SHRINK: u32 = 4;
 
 /// The numbers of one filter.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -123,6 +182,8 @@ pub struct MethodReport {
     pub filter: &'static str,
     /// For each distance, in the order of the options.
     pub distances: Vec<Difference>,
+    /// What the errors are made of, for each distance; empty where that was not asked for.
+    pub budget: Vec<Budget>,
 }
 
 /// How far two ground truths of other random numbers are apart, each of half the samples. The noise of the one that filters
@@ -132,6 +193,8 @@ pub struct MethodReport {
 pub struct Noise {
     /// As [`Difference::rmse`].
     pub rmse: f64,
+    /// As [`Difference::l2`].
+    pub l2: f64,
     /// As [`Difference::flip`].
     pub flip: f32,
 }
@@ -165,6 +228,8 @@ pub struct Finding {
     pub noise: Noise,
     /// By root mean square error of display-encoded values.
     pub rmse: Ranking,
+    /// By root mean square error in linear light.
+    pub l2: Ranking,
     /// By mean FLIP.
     pub flip: Ranking,
     /// Whether noise explains how far every filter is from ground truth, by root mean square.
@@ -214,6 +279,14 @@ pub struct Comparison {
     pub series: Vec<Series>,
 }
 
+impl Args {
+    /// What the flags name, each once.
+    fn methods(&self) -> Vec<Method> {
+        let switched = |method: &Method| Method::new(method.filter, method.correlated && self.correlated);
+        distinct(&self.filters.iter().map(switched).collect::<Vec<_>>())
+    }
+}
+
 /// The command.
 ///
 /// # Errors
@@ -222,7 +295,8 @@ pub struct Comparison {
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let output = args.output.clone().unwrap_or_else(|| outputs::named_after(&args.file, ".compare"));
     outputs::check_folder(&output)?;
-    let series = std::iter::once("truth").chain(args.filters.iter().map(|filter| filter.name()));
+    let methods = args.methods();
+    let series = std::iter::once("truth").chain(methods.iter().map(|method| method.name()));
     let pictures =
         series.flat_map(|name| args.distances.iter().map(move |distance| picture_file(name, *distance)));
     let pictures = pictures.chain(["compare.png".into(), "distance.png".into()]);
@@ -231,12 +305,14 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let scene = read_scene(&file, &args.view.model, &Needs::ALL, &console.progress())?;
     let view = View::new(&scene, &file.to_string_lossy(), &args.view)?;
     let options = Options {
-        filters: distinct(&args.filters),
+        methods,
+        shading: args.shading,
         samples_per_pixel: args.spp,
         truth_samples_per_pixel: args.truth_spp,
         most_truth_samples: args.most_truth_spp,
         max_anisotropy: args.max_anisotropy,
         distances: distinct(&args.distances),
+        budget: args.budget,
         view,
     };
     let comparison = compare(&scene, &file_name(&file), &options, &console.progress())?;
@@ -253,16 +329,16 @@ const NO_MAPS: &str = "no material has a normal, roughness or anisotropy map: th
                        the same";
 
 /// The name of a picture of a filter or of ground truth.
-fn picture_file(series: &str, distance: f32) -> String {
+pub(crate) fn picture_file(series: &str, distance: f32) -> String {
     format!("{series}_x{distance}.png")
 }
 
 /// The values without repetitions, in their order.
-fn distinct<T: PartialEq + Copy>(values: &[T]) -> Vec<T> {
+fn distinct<T: PartialEq + Clone>(values: &[T]) -> Vec<T> {
     let mut kept = Vec::new();
     for value in values {
         if !kept.contains(value) {
-            kept.push(*value);
+            kept.push(value.clone());
         }
     }
     kept
@@ -280,9 +356,10 @@ pub fn compare(
     options: &Options,
     progress: &Progress,
 ) -> Result<Comparison, Error> {
-    if options.filters.is_empty() || options.distances.is_empty() {
+    if options.methods.is_empty() || options.distances.is_empty() {
         return Err(Error::Usage(format!("{title}: nothing to compare; give a filter and a distance")));
     }
+    let methods = different(scene, &options.methods);
     let distances = &options.distances;
     let views: Vec<View> = distances.iter().map(|&d| options.view.zoomed_out(d)).collect();
     // A pixel far away covers more of the model and needs more samples.
@@ -295,21 +372,15 @@ pub fn compare(
     let progress = &all.as_ref().map_or_else(|| progress.clone(), |all| progress.overall(all));
     // All the pictures of one method that are still wanted.
     let draw = |taken: &mut Vec<Taken>, prepared: &RenderScene, mips: Mips, open: &[usize]| {
-        let (samples, filtering) = match mips {
-            Mips::Level0 => (options.truth_samples_per_pixel, TextureFiltering::Level0),
-            _ => {
-                (options.samples_per_pixel, TextureFiltering::Mips { max_anisotropy: options.max_anisotropy })
-            }
+        let (samples, shading, filtering) = match mips {
+            Mips::Level0 => (options.truth_samples_per_pixel, ShadingRate::Sample, TextureFiltering::Level0),
+            _ => (options.samples_per_pixel, options.shading, options.filtering()),
         };
         for &i in open {
             let name = format!("{}, distance {}", mips.name(), distances[i]);
             let first = taken.get(i).map_or(0, |taken| taken.of_half);
-            let count = next(taken, samples, i);
-            let half = |seed| {
-                let samples = Samples { first, count, seed };
-                views[i].render_samples(prepared, &name, samples, filtering, progress)
-            };
-            let more = Taken { halves: [half(1)?, half(2)?], of_half: first + count };
+            let samples = Samples { first, count: next(taken, samples, i), seed: 0, shading };
+            let more = Taken::new(&views[i], prepared, &name, samples, filtering, progress)?;
             match taken.get_mut(i) {
                 Some(taken) => taken.add(&more),
                 None => taken.push(more),
@@ -321,10 +392,10 @@ pub fn compare(
     let (surfaces, apart) = scene_surfaces(scene, Mips::Level0, progress)?;
     let told = scene.warnings.iter().chain(options.view.environment_notes()).cloned();
     let bare = surfaces.iter().all(Option::is_none).then(|| NO_MAPS.to_owned());
-    let warnings = told.chain(apart).chain(bare).collect();
+    let mut warnings: Vec<String> = told.chain(apart).chain(bare).collect();
     let mut prepared = options.view.scene(scene, surfaces, progress)?;
     let mut truth = Vec::new();
-    let mut drawn: Vec<Vec<Taken>> = vec![Vec::new(); options.filters.len()];
+    let mut drawn: Vec<Vec<Taken>> = vec![Vec::new(); methods.len()];
     let mut measured: Vec<Vec<Measured>> = drawn.iter().map(|_| Vec::new()).collect();
     let mut findings: Vec<Finding> = Vec::new();
     let mut open: Vec<usize> = (0..distances.len()).collect();
@@ -342,9 +413,10 @@ pub fn compare(
             set_surfaces(&mut prepared, scene_surfaces(scene, Mips::Level0, progress)?.0);
         }
         draw(&mut truth, &prepared, Mips::Level0, &open)?;
-        for (method, &filter) in options.filters.iter().enumerate() {
-            let mips = Mips::Filtered(filter);
-            set_surfaces(&mut prepared, scene_surfaces(scene, mips, progress)?.0);
+        for (method, mips) in methods.iter().copied().map(Mips::Filtered).enumerate() {
+            let (surfaces, apart) = scene_surfaces(scene, mips, progress)?;
+            warnings.extend(apart);
+            set_surfaces(&mut prepared, surfaces);
             draw(&mut drawn[method], &prepared, mips, &open)?;
             for &i in &open {
                 let distance = distances[i];
@@ -357,15 +429,22 @@ pub fn compare(
         }
         for &i in &open {
             let errors: Vec<&Measured> = measured.iter().map(|of| &of[i]).collect();
-            put(&mut findings, i, find(options, &truth[i], &drawn[0][i], &errors)?);
+            put(&mut findings, i, find(options, &methods, &truth[i], &drawn[0][i], &errors)?);
         }
         // Samples are doubled where that may be enough.
         open.retain(|&i| {
             let most = f64::from(options.most_truth_samples) * f64::from(distances[i]);
             let taken = f64::from(findings[i].truth_samples_per_pixel);
-            let wanted = [&findings[i].rmse, &findings[i].flip].map(Ranking::wanted_samples);
+            let Finding { rmse, l2, flip, .. } = &findings[i];
+            let wanted = [rmse, l2, flip].map(Ranking::wanted_samples);
             2.0 * taken <= most && wanted.into_iter().flatten().any(|samples| samples as f64 <= most)
         });
+    }
+
+    let mut budgets = vec![Vec::new(); methods.len()];
+    if options.budget {
+        let steps = Steps { scene, options, methods: &methods, views: &views, progress };
+        budgets = steps.budgets(&mut prepared, &truth, &drawn, &measured)?;
     }
 
     let pictures = |taken: &[Taken]| -> Vec<Picture> {
@@ -373,11 +452,11 @@ pub fn compare(
     };
     let mut series =
         vec![Series { name: Mips::Level0.name(), pictures: pictures(&truth), errors: Vec::new() }];
-    let mut methods = Vec::new();
-    for ((filter, taken), measured) in options.filters.iter().zip(&drawn).zip(measured) {
+    let mut reports = Vec::new();
+    for (((method, taken), measured), budget) in methods.iter().zip(&drawn).zip(measured).zip(budgets) {
         let (differences, errors) = measured.into_iter().map(|m| (m.difference, m.map)).unzip();
-        methods.push(MethodReport { filter: filter.name(), distances: differences });
-        series.push(Series { name: filter.name(), pictures: pictures(taken), errors });
+        reports.push(MethodReport { filter: method.name(), distances: differences, budget });
+        series.push(Series { name: method.name(), pictures: pictures(taken), errors });
     }
     let report = Report {
         title: title.into(),
@@ -385,16 +464,25 @@ pub fn compare(
         height: options.view.size.1,
         samples_per_pixel: options.samples_per_pixel,
         truth_samples_per_pixel: options.truth_samples_per_pixel,
-        methods,
+        methods: reports,
         findings,
-        warnings,
+        warnings: distinct(&warnings),
     };
     Ok(Comparison { report, series })
 }
 
+/// The methods that draw different pictures: where no material's maps are filtered together, with and without that is the same.
+fn different(scene: &Scene, methods: &[Method]) -> Vec<Method> {
+    if has_mixed(scene) {
+        return methods.to_vec();
+    }
+    distinct(&methods.iter().map(|method| Method::new(method.filter, true)).collect::<Vec<_>>())
+}
+
 /// What stands under tables.
 pub(crate) fn footnote<'a>(findings: impl IntoIterator<Item = &'a Finding>) -> &'static str {
-    match findings.into_iter().any(|finding| finding.rmse.best.or(finding.flip.best).is_some()) {
+    match findings.into_iter().any(|finding| finding.rankings().iter().any(|ranking| ranking.best.is_some()))
+    {
         true => {
             "The nearest to ground truth is marked where it leads by more than noise explains. \
              \"Noise\" is two ground truths of half the samples compared."
@@ -426,6 +514,20 @@ struct Taken {
 }
 
 impl Taken {
+    /// Both halves, each of so many samples; of other seeds.
+    fn new(
+        view: &View,
+        prepared: &RenderScene,
+        name: &str,
+        samples: Samples,
+        filtering: TextureFiltering,
+        progress: &Progress,
+    ) -> Result<Self, Error> {
+        let half =
+            |seed| view.render_samples(prepared, name, Samples { seed, ..samples }, filtering, progress);
+        Ok(Taken { halves: [half(1)?, half(2)?], of_half: samples.first + samples.count })
+    }
+
     /// As many samples more.
     fn add(&mut self, more: &Taken) {
         for (film, more) in self.halves.iter_mut().zip(&more.halves) {
@@ -454,9 +556,12 @@ struct Measured {
     difference: Difference,
     /// FLIP, pixel by pixel.
     map: Vec<f32>,
-    /// Squares of display-encoded differences, and FLIP.
+    /// Squares of display-encoded differences, squares in linear light, and FLIP.
     squares: Errors,
+    linear: Errors,
     flip: Errors,
+    /// Mean square of ground truth in linear light.
+    truth: f64,
 }
 
 fn measure(view: &View, distance: f32, truth: &Taken, taken: &Taken) -> Result<Measured, Error> {
@@ -466,10 +571,15 @@ fn measure(view: &View, distance: f32, truth: &Taken, taken: &Taken) -> Result<M
         [(&truth.halves[0], &taken.halves[0]), (&truth.halves[1], &taken.halves[1]), (&truth_film, &film)];
     let errors = pairs.into_par_iter().map(|(truth, film)| {
         let (wanted, got) = (view.display(truth), view.display(film));
-        Ok((squares(&wanted, &got), flip(&wanted, &got, width, height)?))
+        let linear = squares(&truth.pixels, &film.pixels, |c| c);
+        let display = squares(&wanted, &got, |c| f32::from(c) / 255.0);
+        Ok((display, flip(&wanted, &got, width, height)?, linear))
     });
     let [a, b, whole] = <[_; 3]>::try_from(errors.collect::<Result<Vec<_>, Error>>()?).expect("three pairs");
     let rmse = (whole.0.iter().map(|&e| f64::from(e)).sum::<f64>() / whole.0.len() as f64).sqrt();
+    let [small_truth, small] = [&truth_film, &film].map(|film| film.shrunk(SHRINK));
+    let [wanted, got] = [&small_truth, &small].map(|film| view.display(film));
+    let black = vec![[0.0; 3]; truth_film.pixels.len()];
     Ok(Measured {
         difference: Difference {
             distance,
@@ -477,26 +587,119 @@ fn measure(view: &View, distance: f32, truth: &Taken, taken: &Taken) -> Result<M
             height,
             rmse,
             rmse_linear: rmse_linear(&truth_film.pixels, &film.pixels)?,
+            l2: relative_l2(&truth_film.pixels, &film.pixels)?,
             flip: whole.1.mean,
+            shrunk: Shrunk {
+                rmse: rmse_srgb8(&wanted, &got)?,
+                l2: relative_l2(&small_truth.pixels, &small.pixels)?,
+                flip: flip(&wanted, &got, small.width, small.height)?.mean,
+            },
         },
+        truth: rmse_linear(&truth_film.pixels, &black)?.powi(2),
+        linear: Errors::new(width as usize, [&a.2, &b.2], &whole.2),
         squares: Errors::new(width as usize, [&a.0, &b.0], &whole.0),
         flip: Errors::new(width as usize, [&a.1.map, &b.1.map], &whole.1.map),
         map: whole.1.map,
     })
 }
 
-/// The mean square over the channels of each pixel, black to white being 1.
-fn squares(a: &[[u8; 3]], b: &[[u8; 3]]) -> Vec<f32> {
-    let square = |a: u8, b: u8| ((f32::from(a) - f32::from(b)) / 255.0).powi(2);
+/// What pictures lose one after the other, see [`crate::budget`].
+struct Steps<'a> {
+    scene: &'a Scene,
+    options: &'a Options,
+    methods: &'a [Method],
+    /// One for each distance.
+    views: &'a [View],
+    progress: &'a Progress,
+}
+
+impl Steps<'_> {
+    /// What the errors of each method are made of, at each distance.
+    fn budgets(
+        &self,
+        prepared: &mut RenderScene,
+        truth: &[Taken],
+        drawn: &[Vec<Taken>],
+        measured: &[Vec<Measured>],
+    ) -> Result<Vec<Vec<Budget>>, Error> {
+        let texels = |lobes_only| TextureFiltering::Texels {
+            max_anisotropy: self.options.max_anisotropy,
+            lobes_only,
+            sample: [0; 2],
+        };
+        // Noise is taken off: fewer samples than those of ground truth will do.
+        let few: Vec<u32> = truth.iter().map(|taken| taken.of_half.div_ceil(8)).collect();
+        let kernel = self.errors(prepared, Mips::Level0, texels(false), &few, truth)?;
+        let mut colors: Vec<(bool, Vec<[f64; 2]>)> = Vec::new();
+        let mut budgets = Vec::new();
+        for (method, (drawn, measured)) in self.methods.iter().zip(drawn.iter().zip(measured)) {
+            let correlated = method.correlated;
+            if colors.iter().all(|(of, _)| *of != correlated) {
+                let mips = Mips::Colors { correlated };
+                colors.push((correlated, self.errors(prepared, mips, texels(true), &few, truth)?));
+            }
+            let colors = colors.iter().find(|(of, _)| *of == correlated).map(|(_, errors)| errors);
+            let samples: Vec<u32> = drawn.iter().map(|taken| taken.of_half).collect();
+            let mips = Mips::Uncompressed(*method);
+            let float = self.errors(prepared, mips, self.options.filtering(), &samples, truth)?;
+            let budget = measured.iter().enumerate().map(|(i, measured)| {
+                let shares = |by: usize, errors: &Errors| {
+                    let steps = [kernel[i][by], colors.map_or(0.0, |colors| colors[i][by]), float[i][by]];
+                    let [kernel, color, float] = steps;
+                    Shares::new([kernel, color, float, errors.quiet_mean()], errors.mean())
+                };
+                let (rmse, l2) = (shares(0, &measured.squares), shares(1, &measured.linear));
+                Budget::new(method.name(), measured.difference.distance, rmse, l2)
+            });
+            budgets.push(budget.collect());
+        }
+        Ok(budgets)
+    }
+
+    /// Mean squared errors of other pictures, without noise: display-encoded and in linear light, for each distance.
+    fn errors(
+        &self,
+        prepared: &mut RenderScene,
+        mips: Mips,
+        filtering: TextureFiltering,
+        samples: &[u32],
+        truth: &[Taken],
+    ) -> Result<Vec<[f64; 2]>, Error> {
+        set_surfaces(prepared, scene_surfaces(self.scene, mips, self.progress)?.0);
+        let places = self.views.iter().zip(samples).zip(truth);
+        let errors = places.map(|((view, &count), truth)| {
+            let samples = Samples { first: 0, count, seed: 0, shading: self.options.shading };
+            let taken = Taken::new(view, prepared, "budget", samples, filtering, self.progress)?;
+            let Measured { squares, linear, .. } = measure(view, 0.0, truth, &taken)?;
+            Ok([squares.quiet_mean(), linear.quiet_mean()])
+        });
+        errors.collect()
+    }
+}
+
+/// The mean square difference over the channels of each pixel, in the unit of `value`.
+fn squares<T: Copy>(a: &[[T; 3]], b: &[[T; 3]], value: impl Fn(T) -> f32) -> Vec<f32> {
+    let square = |a: T, b: T| (value(a) - value(b)).powi(2);
     let pixels = a.iter().zip(b);
     pixels.map(|(a, b)| (0..3).map(|c| square(a[c], b[c])).sum::<f32>() / 3.0).collect()
 }
 
 /// What one distance shows; `errors` are of each filter, `truth` and `drawn` of ground truth and any filter.
-fn find(options: &Options, truth: &Taken, drawn: &Taken, errors: &[&Measured]) -> Result<Finding, Error> {
+fn find(
+    options: &Options,
+    methods: &[Method],
+    truth: &Taken,
+    drawn: &Taken,
+    errors: &[&Measured],
+) -> Result<Finding, Error> {
     let [a, b] = [0, 1].map(|half| options.view.display(&truth.halves[half]));
     let Difference { distance, width, height, .. } = errors[0].difference;
-    let noise = Noise { rmse: rmse_srgb8(&a, &b)?, flip: flip(&a, &b, width, height)?.mean };
+    let [film_a, film_b] = &truth.halves;
+    let noise = Noise {
+        rmse: rmse_srgb8(&a, &b)?,
+        l2: relative_l2(&film_a.pixels, &film_b.pixels)?,
+        flip: flip(&a, &b, width, height)?.mean,
+    };
     let squares: Vec<&Errors> = errors.iter().map(|m| &m.squares).collect();
     let only_noise = squares.iter().all(|errors| errors.is_noise());
     let ranking = |order: Order, printed: Vec<f64>, unit: &dyn Fn(f64) -> f64| {
@@ -505,8 +708,7 @@ fn find(options: &Options, truth: &Taken, drawn: &Taken, errors: &[&Measured]) -
         let is_near = |&i: &usize| {
             i == order.first || order.alike.contains(&i) || digits(printed[i]) <= digits(printed[order.first])
         };
-        let nearest: Vec<&str> =
-            (0..printed.len()).filter(is_near).map(|i| options.filters[i].name()).collect();
+        let nearest: Vec<&str> = (0..printed.len()).filter(is_near).map(|i| methods[i].name()).collect();
         let needed = order.samples * f64::from(2 * truth.of_half);
         Ranking {
             best: (nearest.len() == 1 && printed.len() > 1).then(|| nearest[0]),
@@ -519,6 +721,11 @@ fn find(options: &Options, truth: &Taken, drawn: &Taken, errors: &[&Measured]) -
     let by_squares = order(&squares, 0.0);
     let first = errors[by_squares.first].difference.rmse;
     let root = |square: f64| (first * first + square).sqrt() - first;
+    let linear: Vec<&Errors> = errors.iter().map(|m| &m.linear).collect();
+    let by_linear = order(&linear, 0.0);
+    let (first_l2, truth_square) =
+        (errors[by_linear.first].difference.l2, errors[0].truth.max(f64::MIN_POSITIVE));
+    let relative = |square: f64| (first_l2 * first_l2 + square / truth_square).sqrt() - first_l2;
     let mut finding = Finding {
         distance,
         samples_per_pixel: 2 * drawn.of_half,
@@ -526,6 +733,7 @@ fn find(options: &Options, truth: &Taken, drawn: &Taken, errors: &[&Measured]) -
         filters: errors.len(),
         noise,
         rmse: ranking(by_squares, errors.iter().map(|m| m.difference.rmse).collect(), &root),
+        l2: ranking(by_linear, errors.iter().map(|m| m.difference.l2).collect(), &relative),
         flip: ranking(
             order(&flips, FLIP_BEND),
             errors.iter().map(|m| m.difference.flip.into()).collect(),
@@ -570,6 +778,11 @@ impl Ranking {
 }
 
 impl Finding {
+    /// In the order of the table's columns.
+    pub(crate) fn rankings(&self) -> [&Ranking; 3] {
+        [&self.rmse, &self.l2, &self.flip]
+    }
+
     /// What the numbers of this distance show, in a sentence.
     fn sentence(&self) -> String {
         let filters = self.filters;
@@ -579,17 +792,19 @@ impl Finding {
             self.distance,
             counted(samples as usize, "sample", "samples")
         );
-        let [rmse, flip] = [&self.rmse, &self.flip].map(|ranking| ranking.phrase(filters));
+        let [rmse, l2, flip] = self.rankings().map(|ranking| ranking.phrase(filters));
         match (filters, self.only_noise) {
             (1, true) => format!("{head} {} is off by noise alone.", self.rmse.nearest[0]),
             (1, false) => format!("{head} {} is off by more than noise.", self.rmse.nearest[0]),
-            (_, true) if self.flip.best.is_none() => {
+            (_, true) if self.l2.best.is_none() && self.flip.best.is_none() => {
                 format!(
                     "{head} no difference from it, nor between filters, that so many can show; errors are noise."
                 )
             }
-            _ if self.rmse.best.is_some() && rmse == flip => format!("{head} by RMSE and FLIP {rmse}."),
-            _ => format!("{head} by RMSE {rmse}; by FLIP {flip}."),
+            _ if self.rmse.best.is_some() && rmse == l2 && l2 == flip => {
+                format!("{head} by RMSE, L2 and FLIP {rmse}.")
+            }
+            _ => format!("{head} by RMSE {rmse}; by L2 {l2}; by FLIP {flip}."),
         }
     }
 }
@@ -611,29 +826,35 @@ impl Comparison {
         distance_sheet(self)
     }
 
-    /// The numbers as a table: RMSE and FLIP for each filter and distance, those of the nearest filter with a star where noise
-    /// allows to say so, and a sentence for each distance.
+    /// The numbers as tables, one for each distance: the errors of each filter, those of the nearest with a star where noise
+    /// allows to say so, and of pictures shrunk four times; then a sentence for each distance.
     pub fn table(&self) -> String {
         let findings = &self.report.findings;
-        let mut rows = vec![vec!["filter".into()]];
-        for finding in findings {
-            rows[0].push(format!("RMSE x{}", finding.distance));
-            rows[0].push(format!("FLIP x{}", finding.distance));
-        }
-        for method in &self.report.methods {
-            let mut row = vec![method.filter.to_owned()];
-            for (d, finding) in method.distances.iter().zip(findings) {
-                for (error, ranking) in [(d.rmse, &finding.rmse), (d.flip.into(), &finding.flip)] {
+        let mut text = String::new();
+        for (i, finding) in findings.iter().enumerate() {
+            let heading = format!("distance {}", finding.distance);
+            let columns = ["RMSE", "L2", "FLIP", "1/4: RMSE", "L2", "FLIP"].map(str::to_owned);
+            let mut rows = vec![std::iter::once(heading).chain(columns).collect::<Vec<_>>()];
+            for method in &self.report.methods {
+                let d = &method.distances[i];
+                let errors = [d.rmse, d.l2, d.flip.into()].into_iter().zip(finding.rankings());
+                let starred = errors.map(|(error, ranking)| {
                     let star = if ranking.best == Some(method.filter) { "*" } else { "" };
-                    row.push(format!("{star}{error:.4}"));
-                }
+                    format!("{star}{error:.4}")
+                });
+                let shrunk = [d.shrunk.rmse, d.shrunk.l2, d.shrunk.flip.into()];
+                let shrunk = shrunk.map(|error| format!("{error:.4}"));
+                rows.push(std::iter::once(method.filter.to_owned()).chain(starred).chain(shrunk).collect());
             }
-            rows.push(row);
+            let Noise { rmse, l2, flip } = finding.noise;
+            let noise = [rmse, l2, flip.into()].map(|noise| format!("{noise:.4}"));
+            rows.push(std::iter::once("noise".to_owned()).chain(noise).collect());
+            text += &format!("{}\n", table(&rows));
         }
-        let noise = |f: &Finding| [format!("{:.4}", f.noise.rmse), format!("{:.4}", f.noise.flip)];
-        rows.push(std::iter::once("noise".to_owned()).chain(findings.iter().flat_map(noise)).collect());
         let says: String = findings.iter().map(|finding| format!("{}\n", finding.says)).collect();
-        format!("{}\n{says}{}\n", table(&rows), footnote(findings))
+        let budgets = self.report.methods.iter().flat_map(|method| &method.budget);
+        let budgets: String = budgets.map(|budget| format!("{}\n", budget.says)).collect();
+        format!("{text}{says}{budgets}{}\n", footnote(findings))
     }
 
     /// Writes `compare.png`, `distance.png`, every picture alone and `compare.json` to `folder`, which

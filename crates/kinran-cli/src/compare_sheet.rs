@@ -1,6 +1,7 @@
 //! The layout of comparison pictures.
 
-use crate::compare::{Comparison, Difference, Finding, MethodReport, Ranking, Series, footnote};
+use crate::budget::Budget;
+use crate::compare::{Comparison, Difference, Finding, MethodReport, Noise, Ranking, Series, footnote};
 use crate::picture::{Color, INK, PAPER, Picture, text_width, wrapped};
 use crate::values::counted;
 
@@ -56,6 +57,7 @@ fn description(name: &str) -> &'static str {
         "linear" => "mean of SGGX matrices",
         "param" => "SGGX parameters",
         "lean" => "LEAN mapping",
+        apart if apart.ends_with("-apart") => "the same, maps one by one",
         _ => "maps averaged as colours",
     }
 }
@@ -70,10 +72,11 @@ pub(crate) fn comparison_sheet(comparison: &Comparison) -> Picture {
     let column = width.max(COLUMN) + GAP;
     let count = comparison.series.len() as u32;
     let sheet_width = GAP + count * column;
-    let words = Words::new(&scale, sheet_width, [finding]);
+    let budgets = report.methods.iter().filter_map(|method| method.budget.first());
+    let words = Words::new(&scale, sheet_width, &report.findings[..1], budgets);
     let top = scale.length(118);
     let captions = top + height;
-    let maps = captions + scale.length(44);
+    let maps = captions + scale.length(70);
     let end = maps + height.max(scale.length(130));
     let mut sheet = Picture::new(sheet_width, end + words.height(&scale), PAPER);
 
@@ -114,12 +117,13 @@ pub(crate) fn distance_sheet(comparison: &Comparison) -> Picture {
     let nearest = comparison.series[0].pictures.iter().max_by_key(|p| p.width).expect("there is a distance");
     let (width, height) = enlarged(nearest.width, nearest.height);
     let scale = Scale::of(width);
-    let (column, row) = (width.max(COLUMN) + GAP, height + scale.length(40));
-    let (top, margin) = (scale.length(100), scale.length(110));
+    let (column, row) = (width.max(COLUMN) + GAP, height + scale.length(66));
+    let names = comparison.series.iter().map(|series| text_width(scale.name(), series.name));
+    let (top, margin) = (scale.length(100), names.max().unwrap_or(0) + 2 * GAP);
     let distances = &report.methods[0].distances;
     let rows = comparison.series.len() as u32;
     let sheet_width = margin + distances.len() as u32 * column;
-    let words = Words::new(&scale, sheet_width, &report.findings);
+    let words = Words::new(&scale, sheet_width, &report.findings, &report.methods[0].budget);
     let mut sheet = Picture::new(sheet_width, top + rows * row + words.height(&scale), PAPER);
 
     sheet.text((GAP, scale.length(40)), scale.title(), INK, &report.title);
@@ -154,10 +158,15 @@ pub(crate) fn distance_sheet(comparison: &Comparison) -> Picture {
 struct Words(Vec<String>);
 
 impl Words {
-    fn new<'a>(scale: &Scale, sheet_width: u32, findings: impl IntoIterator<Item = &'a Finding>) -> Self {
-        let findings: Vec<&Finding> = findings.into_iter().collect();
-        let footnote = footnote(findings.iter().copied());
-        let texts = findings.into_iter().map(|finding| finding.says.as_str()).chain([footnote]);
+    fn new<'a>(
+        scale: &Scale,
+        sheet_width: u32,
+        findings: &[Finding],
+        budgets: impl IntoIterator<Item = &'a Budget>,
+    ) -> Self {
+        let says = findings.iter().map(|finding| finding.says.as_str());
+        let made_of = budgets.into_iter().map(|budget| budget.says.as_str());
+        let texts = says.chain(made_of).chain([footnote(findings)]);
         Words(texts.flat_map(|text| wrapped(scale.note(), sheet_width - 2 * GAP, text)).collect())
     }
 
@@ -190,12 +199,16 @@ fn numbers(
     let rmse = format!("RMSE {:.4}", this.rmse);
     let end = sheet.text(at, scale.note(), color(&finding.rmse), &rmse);
     sheet.text((end + GAP, at.1), scale.note(), color(&finding.flip), &format!("FLIP {:.4}", this.flip));
+    let below = (at.0, at.1 + scale.length(26));
+    sheet.text(below, scale.note(), color(&finding.l2), &format!("L2   {:.4}", this.l2));
 }
 
 /// What noise alone comes to.
 fn noise(sheet: &mut Picture, scale: &Scale, at: (u32, u32), finding: &Finding) {
-    let text = format!("noise: RMSE {:.4} FLIP {:.4}", finding.noise.rmse, finding.noise.flip);
-    sheet.text(at, scale.note(), FAINT, &text);
+    let Noise { rmse, l2, flip } = finding.noise;
+    sheet.text(at, scale.note(), FAINT, &format!("noise: RMSE {rmse:.4} FLIP {flip:.4}"));
+    let below = (at.0, at.1 + scale.length(26));
+    sheet.text(below, scale.note(), FAINT, &format!("L2 {l2:.4}"));
 }
 
 /// The FLIP error at which all maps of a sheet are brightest: the roundest one that 99 of 100 pixels of all maps stay below.

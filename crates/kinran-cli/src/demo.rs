@@ -15,14 +15,14 @@ use std::path::{Path, PathBuf};
 use clap::Parser;
 use kinran_bake::aniso::Filter;
 use kinran_image::write_atomically;
-use kinran_render::reference::TextureFiltering;
+use kinran_render::reference::{ShadingRate, TextureFiltering};
 use kinran_scene::Scene;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::compare::{self, Finding, MethodReport, compare};
 use crate::picture::Picture;
-use crate::surfaces::{Mips, scene_surfaces};
+use crate::surfaces::{Method, Mips, scene_surfaces};
 use crate::view::{View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, bake, outputs};
 use scenes::Subject;
@@ -94,7 +94,7 @@ impl Scale {
 
     /// Samples of a comparison's pictures.
     fn comparing(&self) -> u64 {
-        let truth_and_filters = self.truth_samples + FILTERS.len() as u32 * self.samples;
+        let truth_and_filters = self.truth_samples + METHODS.len() as u32 * self.samples;
         // From farther away there are fewer pixels and more samples in each.
         let share: f32 = self.distances.iter().map(|distance| 1.0 / distance).sum();
         (samples_of(self.compared, truth_and_filters) as f32 * share) as u64
@@ -106,8 +106,14 @@ impl Scale {
     }
 }
 
-/// What is compared.
-const FILTERS: [Filter; 4] = [Filter::Ml, Filter::Linear, Filter::Lean, Filter::Naive];
+/// What is compared; the second is drawn where it differs from the first.
+const METHODS: [Method; 5] = [
+    Method { filter: Filter::Ml, correlated: true },
+    Method { filter: Filter::Ml, correlated: false },
+    Method { filter: Filter::Linear, correlated: true },
+    Method { filter: Filter::Lean, correlated: true },
+    Method { filter: Filter::Naive, correlated: false },
+];
 
 /// What the demo made of one material. Paths are relative to the output folder.
 #[derive(Serialize, JsonSchema)]
@@ -211,7 +217,7 @@ fn make(subject: Subject, scale: &Scale, folder: &Path, console: &Console) -> Re
 /// The large picture.
 fn take_picture(subject: Subject, scale: &Scale, folder: &Path, progress: &Progress) -> Result<(), Error> {
     let scene = Scene::load(folder.join(model(subject)))?;
-    let (surfaces, _) = scene_surfaces(&scene, Mips::Filtered(Filter::Ml), progress)?;
+    let (surfaces, _) = scene_surfaces(&scene, Mips::DEFAULT, progress)?;
     let view = view(&scene, subject, scale.hero)?;
     let filtering = TextureFiltering::Mips { max_anisotropy: 16 };
     let prepared = view.scene(&scene, surfaces, progress)?;
@@ -226,12 +232,14 @@ fn show(subject: Subject, scale: &Scale, folder: &Path, progress: &Progress) -> 
     let compare_folder = format!("compare/{name}");
     let scene = Scene::load(folder.join(model(subject)))?;
     let options = compare::Options {
-        filters: FILTERS.to_vec(),
+        methods: METHODS.to_vec(),
+        shading: ShadingRate::Pixel,
         samples_per_pixel: scale.samples,
         truth_samples_per_pixel: scale.truth_samples,
         most_truth_samples: scale.truth_samples,
         max_anisotropy: 16,
         distances: scale.distances.to_vec(),
+        budget: true,
         view: view(&scene, subject, scale.compared)?,
     };
     let comparison = compare(&scene, subject.title(), &options, progress)?;
@@ -286,6 +294,7 @@ fn commands(subject: Subject, scale: &Scale) -> Vec<String> {
     let name = subject.name();
     let size = |(width, height): (u32, u32)| format!("{width}x{height}");
     let view = "--camera 0 --env-samples 0";
+    let methods = METHODS.map(Method::name).join(",");
     let distances = scale.distances.iter().map(f32::to_string).collect::<Vec<_>>().join(",");
     vec![
         format!("kinran bake materials/{name} -o baked/{name}"),
@@ -295,8 +304,8 @@ fn commands(subject: Subject, scale: &Scale) -> Vec<String> {
             scale.hero_samples
         ),
         format!(
-            "kinran compare {name}.glb -o compare/{name} --size {} --spp {} --truth-spp {} --most-truth-spp {} \
-             --distances {distances} {view}",
+            "kinran compare {name}.glb -o compare/{name} --filters {methods} --budget --size {} --spp {} --truth-spp {} \
+             --most-truth-spp {} --distances {distances} {view}",
             size(scale.compared),
             scale.samples,
             scale.truth_samples,

@@ -22,7 +22,7 @@ use crate::backend::{Backend, Painter};
 use crate::demo::noise::noise;
 use crate::model::Model;
 use crate::picture::{Picture, Row, grid};
-use crate::surfaces::{Mips, fuzz_fits, scene_surfaces};
+use crate::surfaces::{Method, Mips, fuzz_fits, scene_surfaces};
 use crate::values::{counted, number, vector};
 use crate::view::{EnvironmentChoice, View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, outputs, sheet_flags};
@@ -272,7 +272,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     sheet_flags::refuse_idle(&args.given(), &sheets, |flag, sheet| args.obeys(flag, sheet, plain))?;
     args.view.refuse_idle(&scene, &path.to_string_lossy())?;
     let view = View::new(&scene, &path.to_string_lossy(), &args.view)?;
-    let mips = if only_baked { Mips::Baked } else { Mips::Filtered(Filter::Linear) };
+    let mips = if only_baked { Mips::Baked } else { Mips::Filtered(Method::new(Filter::Linear, true)) };
     let (surfaces, apart) = scene_surfaces(&scene, mips, &progress)?;
     let prepared = view.scene(&scene, surfaces, &progress)?;
     let left_out = painter.left_out(&view, &prepared);

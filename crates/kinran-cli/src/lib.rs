@@ -5,6 +5,7 @@
 
 mod backend;
 pub mod bake;
+pub mod budget;
 pub mod cache;
 pub mod cli;
 pub mod compare;

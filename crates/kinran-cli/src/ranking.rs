@@ -65,8 +65,13 @@ impl Errors {
         Errors { blocks, mean: whole.iter().map(|&e| f64::from(e)).sum::<f64>() / pixels, pixels }
     }
 
+    /// The mean error of the picture of all samples.
+    pub(crate) fn mean(&self) -> f64 {
+        self.mean
+    }
+
     /// The mean error, noise's share taken off.
-    fn quiet_mean(&self) -> f64 {
+    pub(crate) fn quiet_mean(&self) -> f64 {
         2.0 * self.mean - self.half_mean()
     }
 

@@ -13,8 +13,8 @@ use serde::Serialize;
 pub use crate::backend::Backend;
 use crate::model::Model;
 use crate::skin::missing_curvature;
-use crate::surfaces::{Mips, scene_surfaces};
-use crate::values::counted;
+use crate::surfaces::{Method, Mips, scene_surfaces};
+use crate::values::{SWITCH, choice, counted};
 use crate::view::{View, ViewArgs, file_name};
 use crate::{Console, Error, outputs};
 
@@ -65,6 +65,11 @@ pub struct Args {
     #[arg(long, value_name = "NAME", value_parser = mips())]
     pub filter: Option<Mips>,
 
+    /// Filters colour, metalness and lobe together, so that what reflects and what scatters stays from afar; off averages each
+    /// by itself
+    #[arg(long, value_name = "WHETHER", action = clap::ArgAction::Set, default_value = "on", value_parser = choice(SWITCH))]
+    pub correlated: bool,
+
     /// The most places along a slanted pixel's footprint at which a texture is read; 1 is trilinear
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub max_anisotropy: u32,
@@ -75,7 +80,8 @@ pub struct Args {
 }
 
 fn mips() -> impl TypedValueParser<Value = Mips> {
-    let all = || Filter::ALL.map(Mips::Filtered).into_iter().chain([Mips::Level0, Mips::Baked]);
+    let filtered = |filter| Mips::Filtered(Method::new(filter, true));
+    let all = move || Filter::ALL.map(filtered).into_iter().chain([Mips::Level0, Mips::Baked]);
     PossibleValuesParser::new(all().map(mips_name))
         .map(move |name| all().find(|mips| mips_name(*mips) == name).expect("only names pass"))
 }
@@ -129,6 +135,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if mips == Mips::Baked && own != Mips::Baked {
         return refuse("no material has its maps in KTX2 or DDS files; leave --filter out");
     }
+    let mips = mips.correlated(args.correlated);
     let drawn = if only_baked { Mips::Baked } else { mips };
     let (surfaces, apart) = scene_surfaces(&scene, drawn, &progress)?;
     let told = scene.warnings.iter().chain(view.environment_notes()).cloned();
@@ -137,7 +144,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
 
     let filtering = match mips {
         Mips::Level0 => TextureFiltering::Level0,
-        Mips::Filtered(_) | Mips::Baked => TextureFiltering::Mips { max_anisotropy: args.max_anisotropy },
+        _ => TextureFiltering::Mips { max_anisotropy: args.max_anisotropy },
     };
     let prepared = view.scene(&scene, surfaces, &progress)?;
     painter.left_out(&view, &prepared).iter().for_each(|what| console.warn(what));

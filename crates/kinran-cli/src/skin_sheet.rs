@@ -28,7 +28,7 @@ use crate::model::{model_at, read_scene};
 use crate::picture::{Color, INK, PAPER, Picture, Row, grid};
 use crate::skin::{SIZE, profile, skin_table};
 use crate::skin_lut::plot::plot;
-use crate::surfaces::{Mips, scene_surfaces};
+use crate::surfaces::{self, Mips, scene_surfaces};
 use crate::values::{choice, counted, number, vector};
 use crate::view::{EnvironmentChoice, View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, outputs, sheet_flags};
@@ -201,7 +201,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         ViewArgs { env: Some(args.view.env.clone().unwrap_or(EnvironmentChoice::None)), ..args.view.clone() };
     shown.refuse_idle(&scene, &file.to_string_lossy())?;
     let mut view = View::new(&scene, &file.to_string_lossy(), &shown)?;
-    let (surfaces, apart) = scene_surfaces(&scene, Mips::Filtered(Filter::Linear), &progress)?;
+    // Skin is no metal, and may be given another colour.
+    let mips = Mips::Filtered(surfaces::Method::new(Filter::Linear, false));
+    let (surfaces, apart) = scene_surfaces(&scene, mips, &progress)?;
     warnings.extend(view.environment_notes().cloned().chain(apart));
     warnings.iter().for_each(|w| console.warn(w));
     let mut prepared = view.scene(&scene, surfaces, &progress)?;

@@ -1,43 +1,90 @@
 //! The textures that a renderer draws a scene's surfaces with.
 
+use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::Vec3;
+use kinran::bake::{Together, together, why_apart};
+use kinran::options::TextureOptions;
 use kinran_bake::aniso::{
-    Filter, NormalMap, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps, SurfaceOptions, TexelSpan,
-    bake_surface,
+    Filter, NormalMap, Reflectance, RoughnessMaps, ScalarMap, Sheet, SheetRequest, SurfaceMaps,
+    SurfaceOptions, TexelSpan, Weights, bake_surface,
 };
 use kinran_bake::fuzz_fit::{FuzzFit, Phase, ambient_texels, fuzz_fit};
-use kinran_bake::{NoSurface, material_surface};
-use kinran_image::{Cancelled, Format, Role, Texture, full_level_count, level_size};
+use kinran_bake::metal::BaseAndMetal;
+use kinran_bake::{MaterialSurface, NoSurface, material_reflectance, material_surface};
+use kinran_image::{Cancelled, Format, Level, Role, Texture, Transfer, full_level_count, level_size};
 use kinran_render::reference::{
-    AnisoEncoding, BoundTexture, FUZZ_TILTS, FuzzCoefficients, FuzzFits, MipLevel, MipTexture,
+    AnisoEncoding, BoundTexture, ColorTextures, FUZZ_TILTS, FuzzCoefficients, FuzzFits, MipLevel, MipTexture,
     SurfaceTextures,
 };
 use kinran_scene::{FuzzPhase, Material, Scene, TextureRef};
 use kinran_shading::fuzz::{FUZZ_COMBED_ALPHA, fuzz_alpha};
 use rayon::prelude::*;
 
+use crate::progress::Bars;
 use crate::{Error, Progress};
+
+/// A way to make mips.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Method {
+    /// How a footprint becomes one texel.
+    pub filter: Filter,
+    /// Whether colour, metalness and lobe are filtered together, where they can be.
+    pub correlated: bool,
+}
+
+impl Method {
+    /// As a bake has it: a filter that knows nothing of metal takes each map by itself.
+    pub fn new(filter: Filter, correlated: bool) -> Self {
+        let mut options = TextureOptions::default();
+        (options.filter, options.correlated) = (filter, correlated);
+        Method { filter, correlated: options.is_correlated() }
+    }
+
+    /// The filter's name; with `-apart` where it would filter colour, metalness and lobe together, and does not.
+    pub fn name(self) -> &'static str {
+        match (self.filter, self.correlated) {
+            (filter @ Filter::Naive, _) | (filter, true) => filter.name(),
+            (Filter::Ml, false) => "ml-apart",
+            (Filter::Dpd, false) => "dpd-apart",
+            (Filter::Linear, false) => "linear-apart",
+            (Filter::Param, false) => "param-apart",
+            (Filter::Lean, false) => "lean-apart",
+        }
+    }
+}
 
 /// Which texels surfaces are drawn with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mips {
-    /// A filter's mip chain as it is after block compression: BC5 normals, BC7 aniso.
-    Filtered(Filter),
+    /// A filter's mip chain as it is after block compression: BC5 normals, BC7 aniso. Colours are not compressed.
+    Filtered(Method),
+    /// The same mip chain in floats.
+    Uncompressed(Method),
+    /// Level 0 of normals and lobes, in floats, with what texels count in a filter as alpha of the normals; colours as they are
+    /// filtered with the lobes, or by themselves.
+    Colors {
+        /// Whether they are filtered together.
+        correlated: bool,
+    },
     /// Level 0 alone, in floats: ground truth.
     Level0,
     /// The mip chains that came with the model in KTX2 or DDS files, as they are; materials without any as
-    /// [`Filter::Ml`] makes them.
+    /// [`Mips::DEFAULT`] has them.
     Baked,
 }
 
 impl Mips {
-    /// The filter's name, `baked`, or `truth`.
+    /// What a bake makes that is not told how.
+    pub const DEFAULT: Mips = Mips::Filtered(Method { filter: Filter::Ml, correlated: true });
+
+    /// The method's name, `baked`, or `truth`.
     pub fn name(self) -> &'static str {
         match self {
-            Mips::Filtered(filter) => filter.name(),
+            Mips::Filtered(method) | Mips::Uncompressed(method) => method.name(),
+            Mips::Colors { .. } => "colours",
             Mips::Level0 => "truth",
             Mips::Baked => "baked",
         }
@@ -46,7 +93,23 @@ impl Mips {
     /// What a model is drawn with unless someone asks for something else: its own mips if it has any.
     pub fn of(scene: &Scene) -> Self {
         let baked = scene.materials.iter().any(|m| baked_maps(scene, m).is_some());
-        if baked { Mips::Baked } else { Mips::Filtered(Filter::Ml) }
+        if baked { Mips::Baked } else { Mips::DEFAULT }
+    }
+
+    fn is_correlated(self) -> bool {
+        match self {
+            Mips::Filtered(method) | Mips::Uncompressed(method) => method.correlated,
+            Mips::Colors { correlated } => correlated,
+            Mips::Level0 | Mips::Baked => false,
+        }
+    }
+
+    /// With colour, metalness and lobe filtered together, or each by itself.
+    pub fn correlated(self, correlated: bool) -> Self {
+        match self {
+            Mips::Filtered(method) => Mips::Filtered(Method::new(method.filter, correlated)),
+            mips => mips,
+        }
     }
 }
 
@@ -65,7 +128,7 @@ pub fn scene_surfaces(
         let mips = match mips {
             Mips::Baked => match baked_surface(scene, &scene.materials[i])? {
                 Some(surface) => return Ok(Some(surface)),
-                None => Mips::Filtered(Filter::Ml),
+                None => Mips::DEFAULT,
             },
             mips => mips,
         };
@@ -73,9 +136,12 @@ pub fn scene_surfaces(
             Ok(surface) => {
                 let sheets = [Sheet::Normal, Sheet::Aniso];
                 let name = &scene.materials[i].name;
-                let [normal, aniso] = textures(&surface.maps, sheets, mips, name, progress)?;
-                let [normal, aniso] = [normal, aniso].map(|t| bind(t, surface.place.as_ref()));
-                Ok(Some(SurfaceTextures::new(normal, aniso)))
+                let together = filtered_together(scene, i, &surface, mips, &mut warnings, progress)?;
+                let [normal, aniso] = textures(&together.maps, sheets, mips, name, progress)?;
+                let place = surface.place.as_ref();
+                let [normal, aniso] = [normal, aniso].map(|t| bind(t, place));
+                let colors = together.pair.map(|pair| colors(pair, &surface)).transpose()?;
+                Ok(Some(SurfaceTextures { colors, ..SurfaceTextures::new(normal, aniso) }))
             }
             Err(NoSurface::Plain) => Ok(None),
             Err(NoSurface::Apart(reason)) => {
@@ -86,6 +152,67 @@ pub fn scene_surfaces(
     });
     let surfaces = surfaces.collect::<Result<_, Error>>()?;
     Ok((surfaces, warnings))
+}
+
+/// The maps of a surface with their weights, and its base colour and metalness, as a bake of all its textures makes them.
+fn filtered_together(
+    scene: &Scene,
+    material: usize,
+    surface: &MaterialSurface,
+    mips: Mips,
+    warnings: &mut Vec<String>,
+    progress: &Progress,
+) -> Result<Together, Error> {
+    if !mips.is_correlated() {
+        return Ok(Together { maps: surface.maps.clone(), pair: None });
+    }
+    let name = &scene.materials[material].name;
+    let reflectance = material_reflectance(scene, material, surface).unwrap_or_else(|reason| {
+        warnings.push(reason);
+        None
+    });
+    let mut maps = surface.maps.clone();
+    maps.weights = reflectance.as_ref().and_then(|of| of.weights(maps.size())).map(Arc::new);
+    let reflectance = reflectance.filter(|_| maps.weights.is_some());
+    let apart = |of: &Reflectance| why_apart(&format!("material \"{name}\""), of, &maps);
+    warnings.extend(reflectance.as_ref().and_then(apart));
+    let (kernel, bars) = (SurfaceOptions::default().kernel, Bars::new(progress.clone()));
+    Ok(together(&maps, reflectance.as_ref(), None, name, kernel, bars.task())?)
+}
+
+/// Whether any material's maps are filtered together: what it reflects differs from texel to texel.
+pub(crate) fn has_mixed(scene: &Scene) -> bool {
+    (0..scene.materials.len()).any(|i| {
+        let weights = |surface: MaterialSurface| {
+            let reflectance = material_reflectance(scene, i, &surface).ok().flatten()?;
+            reflectance.weights(surface.maps.size())
+        };
+        material_surface(scene, i).is_ok_and(|surface| weights(surface).is_some())
+    })
+}
+
+/// Base colour and metalness as textures, in 8 bits.
+fn colors(pair: BaseAndMetal, surface: &MaterialSurface) -> Result<ColorTextures, Error> {
+    let levels = pair.color.into_iter();
+    let levels = levels.map(|level| Level { width: level.width, height: level.height, data: level.rgba8 });
+    let base_color = Texture {
+        format: Format::Rgba8,
+        transfer: Transfer::Srgb,
+        levels: levels.collect(),
+        metadata: BTreeMap::new(),
+    };
+    let ((width, height), wrap) = (surface.maps.size(), surface.maps.wrap);
+    let levels = (0..).zip(pair.metallic).map(|(level, metallic)| MipLevel {
+        width: level_size(width, level),
+        height: level_size(height, level),
+        texels: metallic.into_iter().map(|m| [1.0, 1.0, f32::from(m) / 255.0, 1.0]).collect(),
+    });
+    let metallic = MipTexture { levels: levels.collect(), wrap, encoded: None };
+    let place = surface.place.as_ref();
+    Ok(ColorTextures {
+        base_color: bind(Arc::new(MipTexture::from_texture(&base_color, wrap)?), place),
+        metallic: bind(Arc::new(metallic), place),
+    })
 }
 
 /// Where a material's own runtime textures of normals and roughness are, `None` for what it has no map of, and how they hold
@@ -139,7 +266,7 @@ fn baked_surface(scene: &Scene, m: &Material) -> Result<Option<SurfaceTextures>,
     // Where there is no map, it is flat, or round: a direction along the tangent.
     let normal = bound(normal, [0.5, 0.5, 1.0, 1.0])?;
     let aniso = bound(aniso, [1.0, 0.5, 1.0, 1.0])?;
-    Ok(Some(SurfaceTextures { normal, aniso, encoding }))
+    Ok(Some(SurfaceTextures { normal, aniso, encoding, colors: None }))
 }
 
 /// Brings vectors of red, green and blue to unit length together, as glTF has it, since shaders rebuild z. Kinran's own
@@ -173,21 +300,23 @@ fn textures<const N: usize>(
     progress: &Progress,
 ) -> Result<[Arc<MipTexture>; N], Error> {
     let size = maps.size();
-    let filter = match mips {
+    let (method, format) = match mips {
         // A single texel has nothing to filter, and a factor is not to be rounded to 8 bits.
-        Mips::Filtered(filter) if size != (1, 1) => filter,
+        Mips::Filtered(method) if size != (1, 1) => (method, None),
+        Mips::Uncompressed(method) if size != (1, 1) => (method, Some(Format::Rgba16F)),
         // What is baked already never comes here.
         _ => return Ok(level_0(maps, sheets).map(Arc::new)),
     };
     let requests = sheets.map(|sheet| {
         let role = if sheet == Sheet::Normal { Role::Normal } else { Role::Aniso };
-        SheetRequest { sheet, encoding: role.encoding(), packed_with: None }
+        let encoding = TextureOptions::default().encoding(role, format);
+        SheetRequest { sheet, encoding, packed_with: None }
     });
     let texels = (0..full_level_count(size.0, size.1))
         .map(|level| u64::from(level_size(size.0, level)) * u64::from(level_size(size.1, level)))
         .sum();
-    let stage = progress.stage(format!("{} {name}", filter.name()), texels);
-    let options = SurfaceOptions { filter, ..SurfaceOptions::default() };
+    let stage = progress.stage(format!("{} {name}", method.name()), texels);
+    let options = SurfaceOptions { filter: method.filter, ..SurfaceOptions::default() };
     let baked = bake_surface(maps, options, &requests, &|texels| stage.tick(texels))?;
     let decoded: Vec<_> = baked
         .textures
@@ -197,7 +326,7 @@ fn textures<const N: usize>(
     decoded.try_into().map_err(|_| Error::Internal("a sheet that was asked for was not baked".into()))
 }
 
-/// The authored texels, uncompressed.
+/// The authored texels, uncompressed, and what they count in alpha: 1 where that is not said.
 fn level_0<const N: usize>(maps: &SurfaceMaps, sheets: [Sheet; N]) -> [MipTexture; N] {
     let (width, height) = maps.size();
     let rows: Vec<[Vec<[f32; 4]>; N]> = (0..height)
@@ -207,7 +336,8 @@ fn level_0<const N: usize>(maps: &SurfaceMaps, sheets: [Sheet; N]) -> [MipTextur
             let texel = |sheet: Sheet, i: usize| {
                 let (n, a) = span.texel(i);
                 let [r, g, b] = sheet.encode(n, a);
-                [r, g, b, 1.0]
+                let weight = |weights: &Arc<Weights>| f32::from(weights.at(i as u32, y)) / 65535.0;
+                [r, g, b, maps.weights.as_ref().map_or(1.0, weight)]
             };
             sheets.map(|sheet| (0..span.len()).map(|i| texel(sheet, i)).collect())
         })

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, ValueEnum};
 use glam::{Affine3A, Mat3, Vec3};
 use kinran_render::reference::{
-    Background, DetailShown, Film, RenderScene, Settings, SurfaceTextures, TextureFiltering, look_at, render,
+    Background, DetailShown, Film, RenderScene, Settings, ShadingRate, SurfaceTextures, TextureFiltering,
+    look_at, render,
 };
 use kinran_render::tonemap::{Tonemap, to_srgb8};
 use kinran_scene::{Camera, Document, Environment, Light, LightKind, Scene};
@@ -245,13 +246,14 @@ pub struct View {
     pub detail: DetailShown,
 }
 
-/// Which samples of a pixel a picture is made of: [`Settings::first_sample`], [`Settings::samples_per_pixel`],
-/// [`Settings::seed`].
+/// Which samples of a pixel a picture is made of, and where they are shaded: [`Settings::first_sample`],
+/// [`Settings::samples_per_pixel`], [`Settings::seed`], [`Settings::shading`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Samples {
     pub(crate) first: u32,
     pub(crate) count: u32,
     pub(crate) seed: u32,
+    pub(crate) shading: ShadingRate,
 }
 
 /// Radiance behind models where no environment's file is given; chosen by eye.
@@ -397,7 +399,8 @@ impl View {
         filtering: TextureFiltering,
         progress: &Progress,
     ) -> Result<Film, Error> {
-        let samples = Samples { first: 0, count: samples_per_pixel, seed: 0 };
+        let shading = ShadingRate::Sample;
+        let samples = Samples { first: 0, count: samples_per_pixel, seed: 0, shading };
         self.render_samples(scene, name, samples, filtering, progress)
     }
 
@@ -420,6 +423,7 @@ impl View {
             first_sample: samples.first,
             seed: samples.seed,
             filtering,
+            shading: samples.shading,
             env_samples: self.env_samples,
             shadows: self.shadows,
             background: self.background,

@@ -29,6 +29,17 @@ pub fn rmse_linear(a: &[[f32; 3]], b: &[[f32; 3]]) -> Result<f64, Error> {
     rmse(a, b, |x, y| f64::from(x) - f64::from(y))
 }
 
+/// The difference from `truth` in linear light, relative to `truth`: both as the roots of sums of squares over all pixels and
+/// channels. 1 where `truth` is black and the picture is not.
+///
+/// # Errors
+/// [`Error::SizeMismatch`] when the slices differ in length.
+pub fn relative_l2(truth: &[[f32; 3]], picture: &[[f32; 3]]) -> Result<f64, Error> {
+    let black = vec![[0.0; 3]; truth.len()];
+    let (error, of) = (rmse_linear(truth, picture)?, rmse_linear(truth, &black)?);
+    Ok(if of > 0.0 { error / of } else { f64::from(u8::from(error > 0.0)) })
+}
+
 /// Root mean square difference of display-encoded 8-bit sRGB values over all pixels and channels, black to
 /// white being 1.
 ///
@@ -92,6 +103,18 @@ mod tests {
         b[2][1] = 3.0;
         let got = rmse_linear(&a, &b).unwrap();
         assert!((got - (4.0f64 / 12.0).sqrt()).abs() < 1e-12, "{got}");
+    }
+
+    #[test]
+    fn relative_errors_do_not_know_exposure() {
+        let truth: Vec<[f32; 3]> = (0..12).map(|i| [i as f32, 1.0, 0.5 * i as f32]).collect();
+        for exposure in [1.0, 8.0] {
+            let bright = |by: f32| truth.iter().map(|p| p.map(|c| by * exposure * c)).collect::<Vec<_>>();
+            let got = relative_l2(&bright(1.0), &bright(1.25)).unwrap();
+            assert!((got - 0.25).abs() < 1e-6, "a quarter brighter: {got}");
+        }
+        assert_eq!(relative_l2(&[[0.0; 3]], &[[0.0; 3]]), Ok(0.0));
+        assert_eq!(relative_l2(&[[0.0; 3]], &[[1.0; 3]]), Ok(1.0));
     }
 
     /// The numbers are those that the PyPI package `flip-evaluator` 1.7 gives for the same pictures:

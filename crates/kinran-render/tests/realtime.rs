@@ -661,6 +661,7 @@ fn anisotropy_as_khronos_has_it_is_that_of_a_texel_on_both_renderers() {
         normal: normal.clone(),
         aniso: BoundTexture::constant([0.5 + 0.5 * direction.x, 0.5 + 0.5 * direction.y, 0.8, 1.0]),
         encoding: AnisoEncoding::Khr { strength, rotation },
+        colors: None,
     };
     // KHR_materials_anisotropy's own formulas, once more.
     let alpha_b = roughness * roughness;

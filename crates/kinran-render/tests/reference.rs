@@ -1,12 +1,12 @@
 //! The reference renderer against closed forms, quadrature and itself.
 
 use glam::{Affine3A, DVec3, Mat3, Vec2, Vec3, Vec4, dvec3, vec2, vec3};
-use kinran_image::{Channels, Image, Pixels, untold};
+use kinran_image::{Channels, Image, Pixels, Transfer, untold};
 use kinran_render::{
     Error,
     reference::{
         Background, BoundTexture, Film, Geometry, MipLevel, MipTexture, PictureCamera, RenderMaterial,
-        RenderScene, Settings, SurfaceTextures, Surroundings, TextureFiltering, look_at, render,
+        RenderScene, Settings, ShadingRate, SurfaceTextures, Surroundings, TextureFiltering, look_at, render,
     },
 };
 use kinran_scene::{
@@ -567,6 +567,146 @@ fn level_of_detail_on_a_plane_is_analytic() {
             draw(&prepared, &camera, &Settings { filtering: TextureFiltering::Level0, ..settings(size, 1) });
         assert_eq!(film.pixels[(size * size / 2) as usize][0], 0.0, "ground truth reads a coarser level");
     }
+}
+
+#[test]
+fn a_pixel_is_shaded_beside_its_centre() {
+    let mut m = material(Vec3::ZERO, 0.0, 1.0);
+    m.emissive_factor = Vec3::ONE;
+    let mut prepared = prepare(&scene(vec![square(0)], vec![m]), None);
+    // Noise much finer than pixels, so that no other place shows the same.
+    let side = 256u32;
+    let noise = |i: u32| ((i.wrapping_mul(2_654_435_761) >> 8) & 0xFFFF) as f32 / 65535.0;
+    let texels = (0..side * side).map(|i| [noise(i), 0.0, 0.0, 1.0]).collect();
+    let texture = Arc::new(MipTexture {
+        levels: vec![MipLevel { width: side, height: side, texels }],
+        wrap: [Wrap::Repeat; 2],
+        encoded: None,
+    });
+    prepared.materials[0].emissive =
+        Some(BoundTexture { texture: texture.clone(), uv_set: 0, transform: Mat3::IDENTITY });
+    let (size, distance) = (24u32, 3.0f32);
+    let camera = look_at(distance * Vec3::Z, Vec3::ZERO, Vec3::Y, 0.5);
+    let shading = ShadingRate::Pixel;
+    let film = draw(&prepared, &camera, &Settings { shading, ..settings(size, 8) });
+    for (i, pixel) in film.pixels.iter().enumerate() {
+        let place = |k: u32| ((k as f32 + 0.5) / size as f32 - 0.5) * 2.0 * distance * 0.25f32.tan();
+        // The square goes from -1 to 1, v downwards.
+        let uv = vec2(place(i as u32 % size), place(i as u32 / size)) * 0.5 + 0.5;
+        let wanted = texture.sample_level(uv, 0).x;
+        assert!((pixel[0] - wanted).abs() < 0.02, "pixel {i}: wanted {wanted}, got {}", pixel[0]);
+    }
+}
+
+/// What a pixel shows besides the surface at its centre would be lost, or take that one's light.
+#[test]
+fn edges_are_jagged_where_a_pixel_is_shaded_once() {
+    // A white square before a darker one of the same material, and nothing behind.
+    let (mut front, mut back) = (square(0), square(0));
+    front.colors = vec![Vec4::ONE; 4];
+    back.colors = vec![Vec4::new(0.3, 0.3, 0.3, 1.0); 4];
+    for (primitive, by) in [(&mut front, vec3(0.313, 0.207, 1.0)), (&mut back, Vec3::ZERO)] {
+        primitive.positions.iter_mut().for_each(|p| *p += by);
+    }
+    let mut both = scene(vec![front, back], vec![material(Vec3::ONE, 0.0, 1.0)]);
+    both.lights = vec![directional(Vec3::NEG_Z, 2.0)];
+    let prepared = prepare(&both, None);
+    let camera = look_at(6.0 * Vec3::Z, Vec3::ZERO, Vec3::Y, 0.5);
+    let shot = |shading| draw(&prepared, &camera, &Settings { shading, shadows: false, ..settings(33, 16) });
+    let (by_sample, by_pixel) = (shot(ShadingRate::Sample), shot(ShadingRate::Pixel));
+    let mut mixed = 0;
+    for (i, (wanted, got)) in by_sample.pixels.iter().zip(&by_pixel.pixels).enumerate() {
+        assert!((wanted[0] - got[0]).abs() < 4e-3, "pixel {i}: wanted {wanted:?}, got {got:?}");
+        mixed += u32::from((0.1..0.25).contains(&wanted[0]) || (0.3..0.55).contains(&wanted[0]));
+    }
+    assert!(mixed > 20, "only {mixed} pixels lie on edges");
+}
+
+#[test]
+fn places_are_not_chosen_as_often_as_they_count_in_mips() {
+    let mut m = material(Vec3::ZERO, 0.0, 1.0);
+    m.emissive_factor = Vec3::ONE;
+    let mut prepared = prepare(&scene(vec![square(0)], vec![m]), None);
+    let wrap = [Wrap::Repeat; 2];
+    let red = |(width, height): (u32, u32), value: &dyn Fn(u32, u32) -> f32| {
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let pixels = Pixels::F32(places.flat_map(|(x, y)| [value(x, y), 0.0, 0.0]).collect());
+        let image = Image::new(width, height, Channels::Rgb, pixels).unwrap();
+        let texture = Arc::new(MipTexture::from_image(&image, Transfer::Linear, wrap));
+        BoundTexture { texture, uv_set: 0, transform: Mat3::from_scale(Vec2::splat(4.0)) }
+    };
+    for (size, eye) in
+        [((64, 64), vec3(0.0, 0.0, 4.0)), ((96, 80), vec3(0.5, -3.0, 1.5)), ((48, 100), vec3(0.0, 0.2, 7.0))]
+    {
+        let noise = |x: u32, y: u32| {
+            let i = (y % size.1) * size.0 + x % size.0;
+            (i.wrapping_mul(2_654_435_761) >> 24) as f32 / 255.0
+        };
+        // Bilinear reads at all places of a texel: an eighth of each neighbour along both axes.
+        let weights = [(size.0 - 1, 0.125), (0, 0.75), (1, 0.125)];
+        let blurred = |x: u32, y: u32| -> f32 {
+            let row = |y: u32| weights.map(|(dx, w)| w * noise(x + dx, y)).iter().sum::<f32>();
+            [(size.1 - 1, 0.125), (0, 0.75), (1, 0.125)].map(|(dy, w)| w * row(y + dy)).iter().sum()
+        };
+        // A pixel covers more than two texels, so that level 0 itself is not read.
+        let camera = look_at(eye, Vec3::ZERO, Vec3::Y, 0.2);
+        for max_anisotropy in [1, 8] {
+            let mut shot = |texture, filtering| {
+                prepared.materials[0].emissive = Some(texture);
+                let shading = ShadingRate::Pixel;
+                draw(&prepared, &camera, &Settings { filtering, shading, ..settings(12, 4096) })
+            };
+            let mips = shot(red(size, &blurred), TextureFiltering::Mips { max_anisotropy });
+            let texels = TextureFiltering::Texels { max_anisotropy, lobes_only: false, sample: [0; 2] };
+            let got = shot(red(size, &noise), texels);
+            for (i, (wanted, got)) in mips.pixels.iter().zip(&got.pixels).enumerate() {
+                // A deviation of 0.29 for each of the samples: 0.0045 of their mean.
+                let off = (wanted[0] - got[0]).abs();
+                assert!(
+                    off < 0.018,
+                    "{size:?}, {max_anisotropy}x, pixel {i}: wanted {wanted:?}, got {got:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn lobes_that_do_not_count_are_seen() {
+    // Stripes that tilt to the left and to the right, several of them in a pixel; those to the right count for so much.
+    let texture = |right: f32, counts: f32| {
+        let texel = |i: u32| match i % 64 / 16 % 2 {
+            0 => [0.5 - 0.5 * 0.3, 0.5, 1.0, 1.0],
+            _ => [0.5 + 0.5 * right, 0.5, 1.0, counts],
+        };
+        let levels = vec![MipLevel { width: 64, height: 64, texels: (0..64 * 64).map(texel).collect() }];
+        let texture = MipTexture { levels, wrap: [Wrap::Repeat; 2], encoded: None };
+        BoundTexture { texture: Arc::new(texture), uv_set: 0, transform: Mat3::IDENTITY }
+    };
+    let mut lit = scene(vec![square(0)], vec![material(Vec3::ONE, 1.0, 0.5)]);
+    lit.lights = vec![directional(vec3(0.5, 0.0, -1.0), 1.0)];
+    let mut prepared = prepare(&lit, None);
+    let aniso = BoundTexture::constant([0.3, 0.5, 0.3, 1.0]);
+    let camera = look_at(12.0 * Vec3::Z, Vec3::ZERO, Vec3::Y, 0.1);
+    let mut shot = |right, counts| {
+        let surface = SurfaceTextures::new(texture(right, counts), aniso.clone());
+        prepared.materials[0].surface = Some(surface);
+        let filtering = TextureFiltering::Texels { max_anisotropy: 1, lobes_only: true, sample: [0; 2] };
+        let shading = ShadingRate::Pixel;
+        mean(&draw(&prepared, &camera, &Settings { filtering, shading, ..settings(1, 4096) })).x
+    };
+    let (both, few, left) = (shot(0.3, 1.0), shot(0.3, 0.001), shot(-0.3, 1.0));
+    // A sixteenth of the places lies between two stripes.
+    assert!((few / left - 1.0).abs() < 0.06, "that count 1 in 1000: wanted {left}, got {few}");
+    assert!((both / left - 1.0).abs() > 0.2, "that count as much: {both}, without them {left}");
+}
+
+#[test]
+fn a_shrunk_picture_is_not_the_mean_of_what_it_covers() {
+    let film = Film { width: 3, height: 2, pixels: (0..6).map(|i| [i as f32, 1.0, 0.0]).collect() };
+    let shrunk = film.shrunk(2);
+    assert_eq!((shrunk.width, shrunk.height), (2, 1));
+    assert_eq!(shrunk.pixels, [[2.0, 1.0, 0.0], [3.5, 1.0, 0.0]]);
 }
 
 #[test]

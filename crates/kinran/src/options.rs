@@ -143,8 +143,8 @@ impl TextureOptions {
         SurfaceOptions { filter: self.filter, kernel: self.kernel }
     }
 
-    /// Whether colour, metalness and lobes are filtered together.
-    pub(crate) fn is_correlated(&self) -> bool {
+    /// Whether colour, metalness and lobes are filtered together where they can be.
+    pub fn is_correlated(&self) -> bool {
         self.correlated && self.filter != Filter::Naive
     }
 

@@ -233,7 +233,7 @@ impl App {
 
     /// The methods to show, left and right, and asks for those that are not baked. Something is shown until they are.
     fn methods(&mut self) -> [Option<Mips>; 2] {
-        let wanted = self.parameters.methods.map(|i| METHODS[i].1);
+        let wanted = self.parameters.mips();
         let Some(model) = &mut self.model else { return [None, None] };
         // Level 0 needs no filter: it is there first, and no bake takes the processor from the first picture.
         let mut ask = vec![Mips::Level0];
@@ -254,7 +254,7 @@ impl App {
 
     /// Whether all that was asked for is shown, smoothly.
     fn settled(&self) -> bool {
-        let wanted = self.parameters.methods.map(|i| METHODS[i].1);
+        let wanted = self.parameters.mips();
         let sides = if self.parameters.split { 2 } else { 1 };
         self.busy.is_empty()
             && self.loader.baking().is_none()
@@ -422,7 +422,10 @@ impl App {
                 Key::F => wishes.frame_model = true,
                 Key::P => wishes.save_picture = true,
                 Key::C => p.split = !p.split,
-                Key::X => p.methods.swap(0, 1),
+                Key::X => {
+                    p.methods.swap(0, 1);
+                    p.correlated.swap(0, 1);
+                }
                 Key::R => reload = true,
                 Key::Escape => {
                     self.help = false;
@@ -585,9 +588,16 @@ impl App {
             let white = egui::Stroke::new(1.5, Color32::WHITE);
             painter.vline(line, rect.y_range(), white);
             let label = |x: f32, align, i: usize| {
-                let name = METHODS[self.parameters.methods[i]].0;
+                let (name, mips) = METHODS[self.parameters.methods[i]];
+                let apart = if self.parameters.mips()[i] == mips { "" } else { ", maps one by one" };
                 let font = egui::FontId::proportional(16.0);
-                painter.text(pos2(x, rect.top() + 10.0), align, name, font, Color32::WHITE);
+                painter.text(
+                    pos2(x, rect.top() + 10.0),
+                    align,
+                    format!("{name}{apart}"),
+                    font,
+                    Color32::WHITE,
+                );
             };
             label(line - 10.0, egui::Align2::RIGHT_TOP, 0);
             label(line + 10.0, egui::Align2::LEFT_TOP, 1);

@@ -304,7 +304,7 @@ impl Work {
         }
         let filtering = match mips {
             Mips::Level0 => TextureFiltering::Level0,
-            Mips::Filtered(_) | Mips::Baked => TextureFiltering::Mips { max_anisotropy: 16 },
+            _ => TextureFiltering::Mips { max_anisotropy: 16 },
         };
         let renderer = self.renderer.read().map_err(|e| Error::Internal(e.to_string()))?;
         if self.common.closing.load(Relaxed) {
@@ -343,6 +343,7 @@ mod tests {
     use kinran_scene::{Material, TextureRef, Wrap};
 
     use super::*;
+    use crate::surfaces::Method;
 
     /// Who shows another model, or closes the window, would wait for the processor.
     #[test]
@@ -361,7 +362,7 @@ mod tests {
             materials: vec![Material { normal: Some(normal), ..Material::default() }],
             ..Scene::default()
         };
-        let wanted = (0, Arc::new(scene), Mips::Filtered(Filter::Linear));
+        let wanted = (0, Arc::new(scene), Mips::Filtered(Method::new(Filter::Linear, true)));
         for closing in [false, true] {
             let name = if closing { "the window closes" } else { "another model is shown" };
             let stop = |common: &Common| {

@@ -38,12 +38,22 @@ pub(super) struct Shown<'a> {
     pub(super) first_picture: Option<Duration>,
 }
 
-fn method(ui: &mut Ui, label: &str, chosen: &mut usize, baked: &[Mips]) {
-    egui::ComboBox::from_label(label).selected_text(METHODS[*chosen].0).show_ui(ui, |ui| {
-        for (i, (name, mips)) in METHODS.iter().enumerate() {
-            let note = if baked.contains(mips) { "" } else { "  (not baked yet)" };
-            ui.selectable_value(chosen, i, format!("{name}{note}"));
-        }
+/// The method of one side, and its switch where that changes anything.
+fn method(ui: &mut Ui, label: &str, p: &mut Parameters, side: usize, baked: &[Mips]) {
+    let (chosen, correlated) = (&mut p.methods[side], &mut p.correlated[side]);
+    ui.horizontal(|ui| {
+        egui::ComboBox::from_label(label).selected_text(METHODS[*chosen].0).show_ui(ui, |ui| {
+            for (i, (name, mips)) in METHODS.iter().enumerate() {
+                let is_baked = baked.contains(&mips.correlated(*correlated));
+                let note = if is_baked { "" } else { "  (not baked yet)" };
+                ui.selectable_value(chosen, i, format!("{name}{note}"));
+            }
+        });
+        let mips = METHODS[*chosen].1;
+        ui.add_enabled_ui(mips.correlated(false) != mips, |ui| {
+            ui.checkbox(correlated, "with colour")
+                .on_hover_text("filters colour, metalness and lobe together; off: each by itself");
+        });
     });
 }
 
@@ -63,9 +73,9 @@ pub(super) fn panel(ui: &mut Ui, p: &mut Parameters, selected: &mut usize, shown
 
     egui::CollapsingHeader::new("Compare").default_open(true).show(ui, |ui| {
         ui.checkbox(&mut p.split, "split line").on_hover_text("C; drag the line");
-        method(ui, if p.split { "left" } else { "filter" }, &mut p.methods[0], shown.baked);
+        method(ui, if p.split { "left" } else { "filter" }, p, 0, shown.baked);
         if p.split {
-            method(ui, "right", &mut p.methods[1], shown.baked);
+            method(ui, "right", p, 1, shown.baked);
         }
         ui.horizontal_wrapped(|ui| {
             for (i, (name, _)) in CHANNELS.iter().enumerate() {

@@ -16,7 +16,7 @@ use super::detail::DetailParameters;
 use super::fuzz::FuzzParameters;
 use super::orbit::Orbit;
 use crate::Error;
-use crate::surfaces::Mips;
+use crate::surfaces::{Method, Mips};
 use crate::view::{Curve, EnvironmentChoice, ViewArgs};
 
 /// Names and meanings of what can be shown of a surface.
@@ -39,15 +39,19 @@ pub(super) const CURVATURES: [(&str, SkinCurvature); 4] = [
     ("normalised", SkinCurvature::Normalized),
 ];
 
+const fn filtered(filter: Filter) -> Mips {
+    Mips::Filtered(Method { filter, correlated: !matches!(filter, Filter::Naive) })
+}
+
 /// Names and meanings of the ways to filter. New ones come last: saved parameters hold places in this list.
 pub(super) const METHODS: [(&str, Mips); 7] = [
-    ("ml", Mips::Filtered(Filter::Ml)),
-    ("linear", Mips::Filtered(Filter::Linear)),
-    ("lean", Mips::Filtered(Filter::Lean)),
-    ("naive", Mips::Filtered(Filter::Naive)),
+    ("ml", filtered(Filter::Ml)),
+    ("linear", filtered(Filter::Linear)),
+    ("lean", filtered(Filter::Lean)),
+    ("naive", filtered(Filter::Naive)),
     ("ground truth", Mips::Level0),
     ("as baked", Mips::Baked),
-    ("dpd", Mips::Filtered(Filter::Dpd)),
+    ("dpd", filtered(Filter::Dpd)),
 ];
 
 /// A material as the sliders have it; factors multiply its textures.
@@ -204,12 +208,20 @@ impl Sun {
     }
 }
 
+/// Both sides.
+fn both() -> [bool; 2] {
+    [true; 2]
+}
+
 /// Everything that a control sets.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Parameters {
     /// Index into [`METHODS`]: what is left of the split line, and right of it.
     pub(super) methods: [usize; 2],
+    /// Whether they filter colour, metalness and lobe together.
+    #[serde(default = "both")]
+    pub(super) correlated: [bool; 2],
     /// Whether there is a split line.
     pub(super) split: bool,
     /// Share of the picture left of it.
@@ -245,6 +257,7 @@ impl Parameters {
         let towards = view.light.first().copied().unwrap_or(Vec3::new(-0.5, 0.7, 0.6)).normalize();
         Self {
             methods: [0, 3],
+            correlated: both(),
             split: false,
             split_at: 0.5,
             channel: 0,
@@ -275,6 +288,11 @@ impl Parameters {
             orbit: None,
             materials: Vec::new(),
         }
+    }
+
+    /// What to draw with, left and right of the line.
+    pub(super) fn mips(&self) -> [Mips; 2] {
+        [0, 1].map(|side| METHODS[self.methods[side]].1.correlated(self.correlated[side]))
     }
 
     /// The tone curve named.
@@ -330,8 +348,29 @@ mod tests {
         let mut parameters = Parameters::from_args(&ViewArgs::default());
         parameters.sun.azimuth = 12.5;
         parameters.split = true;
+        parameters.correlated = [true, false];
         parameters.save(&path).unwrap();
         assert_eq!(Parameters::load(&path).unwrap(), parameters);
+        // As they were saved before there was the switch.
+        let saved = std::fs::read_to_string(&path).unwrap();
+        let mut older: serde_json::Value = serde_json::from_str(&saved).unwrap();
+        older.as_object_mut().unwrap().remove("correlated").unwrap();
+        std::fs::write(&path, older.to_string()).unwrap();
+        assert_eq!(Parameters::load(&path).unwrap(), Parameters { correlated: [true; 2], ..parameters });
+    }
+
+    #[test]
+    fn a_switch_acts_on_its_side_and_not_on_what_it_cannot_change() {
+        let off = |method: usize| {
+            let parameters = Parameters::from_args(&ViewArgs::default());
+            Parameters { methods: [method; 2], correlated: [true, false], ..parameters }.mips()
+        };
+        for (method, (name, mips)) in METHODS.iter().enumerate() {
+            let [left, right] = off(method);
+            assert_eq!(left, *mips, "{name}");
+            let changes = !matches!(*name, "naive" | "ground truth" | "as baked");
+            assert_eq!(right != left, changes, "{name}");
+        }
     }
 
     #[test]

@@ -213,6 +213,148 @@ fn from_afar_naive_mips_are_farther_from_the_truth_than_fitted_ones() {
     assert!(finding["says"].as_str().unwrap().contains("ml is nearest"), "{finding}");
 }
 
+/// A folder with `gilded.gltf`: a square of smooth gold leaves scattered over rough blue satin whose fibres lie askew, all in
+/// maps of 64 x 64 texels that repeat twice.
+fn gilded() -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let corners = [[-1.0_f32, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let positions = corners.iter().flat_map(|[x, y]| [*x, *y, 0.0]);
+    let normals = corners.iter().flat_map(|_| [0.0, 0.0, 1.0]);
+    let floats = positions.chain(normals).chain(corners.iter().flat_map(|[x, y]| [x + 1.0, 1.0 - y]));
+    let mut bin: Vec<u8> = floats.flat_map(f32::to_le_bytes).collect();
+    bin.extend([0_u16, 1, 2, 0, 2, 3].into_iter().flat_map(u16::to_le_bytes));
+    std::fs::write(folder.path().join("square.bin"), &bin).unwrap();
+    // Of four texels each way: finer ones are mixed where a sampler blends neighbours of level 0.
+    let is_gold = |i: u32| {
+        let leaf = (i / 64 / 4 * 16 + i % 64 / 4).wrapping_mul(2_654_435_761);
+        (leaf ^ leaf >> 15).wrapping_mul(2_246_822_519) >> 24 < 90
+    };
+    let image = |file: &str, gold: [u8; 3], satin: [u8; 3]| {
+        let texels = (0..64 * 64).flat_map(|i| if is_gold(i) { gold } else { satin }).collect();
+        let image = Image::new(64, 64, Channels::Rgb, Pixels::U8(texels)).unwrap();
+        std::fs::write(folder.path().join(file), encode_png(&image).unwrap()).unwrap();
+    };
+    image("normal.png", [128, 128, 255], [168, 100, 245]);
+    image("color.png", [250, 200, 90], [20, 40, 120]);
+    image("rough.png", [0, 70, 255], [0, 220, 0]);
+    let view =
+        |offset: usize, length: usize| json!({ "buffer": 0, "byteOffset": offset, "byteLength": length });
+    let accessor = |view: usize, kind: &str| json!({ "bufferView": view, "componentType": 5126, "count": 4, "type": kind });
+    let mut first = accessor(0, "VEC3");
+    (first["min"], first["max"]) = (json!([-1.0, -1.0, 0.0]), json!([1.0, 1.0, 0.0]));
+    let document = json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{
+            "attributes": { "POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2 }, "indices": 3, "material": 0
+        }] }],
+        "materials": [{
+            "name": "gilded", "normalTexture": { "index": 0 },
+            "pbrMetallicRoughness": { "baseColorTexture": { "index": 1 }, "metallicRoughnessTexture": { "index": 2 } }
+        }],
+        "textures": [{ "source": 0 }, { "source": 1 }, { "source": 2 }],
+        "images": [{ "uri": "normal.png" }, { "uri": "color.png" }, { "uri": "rough.png" }],
+        "accessors": [first, accessor(1, "VEC3"), accessor(2, "VEC2"),
+            { "bufferView": 3, "componentType": 5123, "count": 6, "type": "SCALAR" }],
+        "bufferViews": [view(0, 48), view(48, 48), view(96, 32), view(128, 12)],
+        "buffers": [{ "uri": "square.bin", "byteLength": bin.len() }]
+    });
+    let path = folder.path().join("gilded.gltf");
+    std::fs::write(&path, document.to_string()).unwrap();
+    (folder, path)
+}
+
+/// Pictures of authored maps and of their bake would show two filters.
+#[test]
+fn authored_maps_are_drawn_with_another_filter_than_a_bake_s() {
+    let (folder, model) = gilded();
+    let at = |name: &str| folder.path().join(name);
+    let picture = |model: &Path, flags: &[&str]| {
+        let out = at("out.png");
+        let shared =
+            ["render", text(model), "-o", text(&out), "--size", "32", "--spp", "16", "--env", "none"];
+        let said = kinran(&[&shared[..], &["--distance", "4", "--from", "0,0,1"], flags].concat());
+        assert_eq!(said.code, Some(0), "{}", said.err);
+        pixels(&read_image(&out).unwrap())
+    };
+    let [on, off] = ["on", "off"].map(|correlated| {
+        let out = at(correlated);
+        let flags = ["--all-textures", "--form", "both", "--encoder", "portable", "--correlated", correlated];
+        let said = kinran(&[&["bake", text(&model), "-o", text(&out)], &flags[..]].concat());
+        assert_eq!(said.code, Some(0), "{}", said.err);
+        let baked = picture(&out.join("gilded.gltf"), &[]);
+        let drawn = picture(&model, &["--correlated", correlated]);
+        let apart = rmse_srgb8(&baked, &drawn).unwrap();
+        // Colours are compressed in one alone.
+        assert!(apart < 0.01, "--correlated {correlated}: authored and baked are {apart} apart");
+        drawn
+    });
+    let apart = rmse_srgb8(&on, &off).unwrap();
+    assert!(apart > 0.03, "together and one by one are {apart} apart");
+}
+
+/// What `kinran compare` says of metal in maps.
+#[test]
+fn colours_that_are_filtered_apart_are_as_near_to_the_truth_or_their_share_is_not_told() {
+    let (folder, model) = gilded();
+    let out = folder.path().join("out");
+    let shared =
+        ["compare", text(&model), "-o", text(&out), "--size", "96", "--spp", "16", "--truth-spp", "64"];
+    let flags = ["--distances", "4", "--from", "0,0,1", "--env", "none", "--filters", "ml,ml-apart,naive"];
+    let args = [&shared[..], &flags, &["--budget"]].concat();
+    let report = kinran_json(&args);
+    let methods = report["methods"].as_array().unwrap();
+    let names: Vec<&str> = methods.iter().map(|method| method["filter"].as_str().unwrap()).collect();
+    assert_eq!(names, ["ml", "ml-apart", "naive"]);
+    assert!(files(&out).contains(&"ml-apart_x4.png".to_owned()), "{:?}", files(&out));
+    let number = |i: usize, what: &str| methods[i]["distances"][0][what].as_f64().unwrap();
+    for what in ["rmse", "l2"] {
+        let (on, off) = (number(0, what), number(1, what));
+        assert!(on < 0.9 * off, "{what}: {on} together, {off} one by one");
+    }
+    for method in methods {
+        let (budget, name) = (&method["budget"][0], &method["filter"]);
+        for measure in ["rmse", "l2"] {
+            let shares: Vec<f64> =
+                budget[measure].as_object().unwrap().values().filter_map(|v| v.as_f64()).collect();
+            let sum: f64 = shares.iter().sum();
+            assert!(shares.len() == 5 && (sum - 1.0).abs() < 1e-9, "{name}, {measure}: {budget}");
+        }
+    }
+    let colour = |i: usize| {
+        let share = methods[i]["budget"][0]["l2"]["colour_apart"].as_f64().unwrap();
+        share * number(i, "l2").powi(2)
+    };
+    let (on, off) = (colour(0), colour(1));
+    assert!(on < 0.6 * off, "squared error of colour apart: {on} together, {off} one by one");
+    let said = kinran(&args).out;
+    assert!(said.contains("ml-apart x4, its squared error: RMSE") && said.contains("1/4: RMSE"), "{said}");
+
+    // Metal of one colour has nothing that could be apart.
+    let (_square, plain) = square();
+    let args = ["compare", text(&plain), "-o", text(&out), "--size", "16", "--spp", "1", "--truth-spp", "2"];
+    let flags = ["--distances", "1", "--most-truth-spp", "2", "--filters"];
+    for named in [&["ml,ml-apart"][..], &["ml,ml-apart", "--correlated", "off"], &["ml-apart"]] {
+        let report = kinran_json(&[&args[..], &flags, named].concat());
+        let methods = report["methods"].as_array().unwrap();
+        assert!(methods.len() == 1 && methods[0]["filter"] == "ml", "{named:?}: {methods:?}");
+    }
+}
+
+/// A pixel that is shaded at every sample sees each texture through two pixels' widths.
+#[test]
+fn shading_at_every_sample_is_as_sharp_as_once_for_a_pixel() {
+    let (folder, model) = square();
+    let out = folder.path().join("out");
+    let shared =
+        ["compare", text(&model), "-o", text(&out), "--size", "64", "--spp", "16", "--truth-spp", "64"];
+    let flags = ["--distances", "1", "--from", "0,0,1", "--env", "none", "--filters", "ml", "--shading"];
+    let [pixel, sample] = ["pixel", "sample"].map(|shading| {
+        let report = kinran_json(&[&shared[..], &flags, &[shading]].concat());
+        report["methods"][0]["distances"][0]["rmse"].as_f64().unwrap()
+    });
+    assert!(pixel < 0.95 * sample, "once for a pixel {pixel}, at every sample {sample}");
+}
+
 /// Where no texture is seen from afar all filters draw the same, but for noise: the texture is magnified, and the
 /// environment's samples are few.
 #[test]
@@ -228,7 +370,7 @@ fn filters_that_draw_the_same_get_no_mark_whatever_the_noise() {
         let finding = &report["findings"][0];
         let noise = finding["noise"]["rmse"].as_f64().unwrap();
         assert!(noise > 0.002, "there is no noise to be taken for an error: {finding}");
-        for measure in ["rmse", "flip"] {
+        for measure in ["rmse", "l2", "flip"] {
             assert!(finding[measure]["best"].is_null(), "{measure} marks one of {filters}: {finding}");
         }
         let said = kinran(&args);

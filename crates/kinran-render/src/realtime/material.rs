@@ -86,8 +86,8 @@ fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTextur
     [
         m.surface.as_ref().map_or(white, |s| &s.normal),
         m.surface.as_ref().map_or(white, |s| &s.aniso),
-        m.base_color.as_ref().unwrap_or(white),
-        m.metallic_roughness.as_ref().unwrap_or(white),
+        m.drawn_base_color().unwrap_or(white),
+        m.drawn_metallic_roughness().unwrap_or(white),
         m.occlusion.as_ref().unwrap_or(white),
         m.emissive.as_ref().unwrap_or(white),
         translucency.and_then(|t| t.map.as_ref()).unwrap_or(white),

@@ -98,10 +98,8 @@ impl<'a> Textures<'a> {
             Wrap::Mirror => wgpu::AddressMode::MirrorRepeat,
             Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
         };
-        let (lod_max_clamp, anisotropy_clamp) = match self.filtering {
-            TextureFiltering::Mips { max_anisotropy } => (32.0, max_anisotropy as u16),
-            TextureFiltering::Level0 => (0.0, 1),
-        };
+        let most = self.filtering.max_anisotropy();
+        let (lod_max_clamp, anisotropy_clamp) = most.map_or((0.0, 1), |most| (32.0, most as u16));
         let create = || {
             self.gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 address_mode_u: mode(wrap[0]),

@@ -139,11 +139,9 @@ impl RenderDetail {
             let Some(tile) = layer.tiles[map as usize].as_ref().filter(|_| layer.on) else { continue };
             let matrix = layer.matrix * self.tile_scale;
             let at = detail_uv(uv, matrix, said.transform.offset);
-            let texel = match filtering {
-                TextureFiltering::Level0 => tile.sample_level(at, 0),
-                TextureFiltering::Mips { max_anisotropy } => {
-                    tile.sample_grad(at, matrix * dx, matrix * dy, max_anisotropy)
-                }
+            let texel = match filtering.max_anisotropy() {
+                None => tile.sample_level(at, 0),
+                Some(most) => tile.sample_grad(at, matrix * dx, matrix * dy, most),
             };
             let mirror = if said.transform.mirror { detail_mirror(at) } else { Vec2::ONE };
             let value = match map {

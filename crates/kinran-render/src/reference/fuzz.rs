@@ -141,7 +141,7 @@ impl FuzzAt {
         v: Vec3,
         diffuse: Vec3,
     ) -> Option<Self> {
-        let amount = sample(&fuzz.amount, point, filtering).x;
+        let amount = sample(fuzz.amount.as_ref(), point, filtering).x;
         let layer = match &fuzz.fuzz {
             Fuzz::Layer(layer) => layer,
             Fuzz::Simple { fuzziness, .. } => {
@@ -176,7 +176,7 @@ impl FuzzAt {
         let t = if t.dot(n) < 0.0 { -t } else { t };
         let n_v = n.dot(v).max(N_V_MIN);
         let alpha = fuzz_alpha(layer.spread);
-        let color = layer.color * sample(&fuzz.color, point, filtering).xyz();
+        let color = layer.color * sample(fuzz.color.as_ref(), point, filtering).xyz();
         let (t_n, t_v) = (t.dot(n), t.dot(v));
         let factor = fuzz.fits.as_ref().map_or(0.0, |fits| fits.ambient_factor(density, n_v, t_v, t_n));
         let albedo = fuzz_g(density, n_v) * factor;

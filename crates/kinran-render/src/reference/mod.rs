@@ -27,9 +27,10 @@ pub use camera::{CameraRay, PictureCamera, frame_box, look_at};
 pub use detail::{DetailShown, RenderDetail, RenderDetailLayer};
 pub use fuzz::{FUZZ_TILTS, FuzzCoefficients, FuzzFits, RenderFuzz};
 pub use geometry::{FLAT, Geometry, MAX_TRIANGLES, SurfacePoint};
-pub use render::{Background, Film, Settings, render};
+pub use render::{Background, Film, Settings, ShadingRate, render};
 pub use scene::{
-    AnisoEncoding, RenderDielectric, RenderMaterial, RenderScene, SurfaceTextures, Surroundings, Translucency,
+    AnisoEncoding, ColorTextures, RenderDielectric, RenderMaterial, RenderScene, SurfaceTextures,
+    Surroundings, Translucency,
 };
 pub use skin::{RenderSkin, SkinCurvature, SkinTable, SkinTables};
 pub use texture::{MipLevel, MipTexture, TextureFiltering};

@@ -34,6 +34,19 @@ pub enum Background {
     Color(Vec3),
 }
 
+/// Where in a pixel surfaces are shaded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ShadingRate {
+    /// At every sample's own place.
+    #[default]
+    Sample,
+    /// Once for the pixel, as GPUs do it with multisampling: a surface that the pixel's centre shows is shaded there, and
+    /// samples say how much of the pixel it covers. It goes on as far as samples see the same material, from the same side,
+    /// not farther than a pixel's width from the tangent plane at the centre; what they see else is shaded at their own
+    /// places.
+    Pixel,
+}
+
 /// How to render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -50,6 +63,8 @@ pub struct Settings {
     pub seed: u32,
     /// How textures are read.
     pub filtering: TextureFiltering,
+    /// Where surfaces are shaded.
+    pub shading: ShadingRate,
     /// For every sample of a pixel, this many of the specular lobe and as many of the environment; 0 leaves
     /// the environment's specular reflection black.
     pub env_samples: u32,
@@ -69,6 +84,7 @@ impl Default for Settings {
             first_sample: 0,
             seed: 0,
             filtering: TextureFiltering::Mips { max_anisotropy: 16 },
+            shading: ShadingRate::Sample,
             env_samples: 1,
             shadows: true,
             background: Background::Environment { blur: 0.0 },
@@ -87,6 +103,25 @@ pub struct Film {
     pub pixels: Vec<[f32; 3]>,
 }
 
+impl Film {
+    /// The picture at `1 / by` of its width and height, rounded up: each pixel the mean of what it covers.
+    ///
+    /// # Panics
+    /// When `by` is zero.
+    pub fn shrunk(&self, by: u32) -> Film {
+        let (width, height) = (self.width.div_ceil(by), self.height.div_ceil(by));
+        let covered = |at: u32, of: u32| at * by..((at + 1) * by).min(of);
+        let mean = |(x, y): (u32, u32)| {
+            let rows = covered(y, self.height);
+            let places = rows.flat_map(|y| covered(x, self.width).map(move |x| y * self.width + x));
+            let colors: Vec<Vec3> = places.map(|i| Vec3::from(self.pixels[i as usize])).collect();
+            (colors.iter().sum::<Vec3>() / colors.len() as f32).to_array()
+        };
+        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(mean).collect();
+        Film { width, height, pixels }
+    }
+}
+
 /// Longest side of a picture in pixels.
 const MAX_SIDE: u32 = 32768;
 
@@ -99,6 +134,9 @@ const LONG_PIXEL: u32 = 128;
 /// Surfaces one behind the other that a ray may see or pass; beyond it there is nothing. Blended foliage
 /// rarely stacks more than a dozen.
 const MAX_LAYERS: usize = 128;
+
+/// Light of which less comes through is not seen: half a code of an 8-bit display.
+const INVISIBLE: f32 = 1.0 / 512.0;
 
 /// Pairs of the sample sequence.
 const PIXEL: u32 = 0;
@@ -174,7 +212,7 @@ fn check(camera: &Camera, settings: &Settings) -> Result<(), Error> {
     if settings.env_samples > 1024 {
         return refuse("env_samples", settings.env_samples.to_string(), "it must be 0 to 1024");
     }
-    if let TextureFiltering::Mips { max_anisotropy } = settings.filtering
+    if let Some(max_anisotropy) = settings.filtering.max_anisotropy()
         && !(1..=16).contains(&max_anisotropy)
     {
         return refuse("max_anisotropy", max_anisotropy.to_string(), "it must be 1 to 16");
@@ -223,22 +261,101 @@ struct Sample {
     seed: u32,
 }
 
+/// A surface that a ray meets, where it is shaded.
+#[derive(Clone, Copy)]
+struct Place {
+    hit: Hit,
+    point: SurfacePoint,
+    /// The unit direction towards the viewer.
+    view: Vec3,
+    /// A pixel's width there, across the view.
+    width: f32,
+    /// What it shows where that is the same for every sample.
+    shown: Option<(Shading, Vec3)>,
+}
+
+impl Place {
+    fn new(scene: &RenderScene, hit: Hit, ray: &CameraRay) -> Self {
+        let point = scene.geometry.surface_point(&hit, ray);
+        let width = hit.distance * ray.direction_dx.length().max(ray.direction_dy.length());
+        Place { hit, point, view: -ray.direction, width, shown: None }
+    }
+
+    fn shows_back(&self) -> bool {
+        self.point.geometric_normal.dot(self.view) <= 0.0
+    }
+
+    /// Whether the surface of this place goes on to another one, see [`ShadingRate::Pixel`].
+    fn reaches(&self, other: &Place) -> bool {
+        let rise = (other.point.position - self.point.position).dot(self.point.geometric_normal);
+        (self.point.material, self.shows_back()) == (other.point.material, other.shows_back())
+            && rise.abs() <= self.width
+    }
+}
+
 impl Renderer<'_> {
     fn pixel(&self, picture: &PictureCamera, x: u32, y: u32) -> Vec3 {
         let seed = pixel_seed(x, y, self.settings.seed);
         let (first, count) = (self.settings.first_sample, self.settings.samples_per_pixel);
+        let corner = Vec2::new(x as f32, y as f32);
+        let center = match self.settings.shading {
+            ShadingRate::Sample => Vec::new(),
+            ShadingRate::Pixel => self.center(&picture.ray(corner.x + 0.5, corner.y + 0.5), seed),
+        };
         let sum: Vec3 = (first..first + count)
             .map(|index| {
-                let place = Vec2::new(x as f32, y as f32) + sample_2d(index, PIXEL, seed);
-                self.radiance(&picture.ray(place.x, place.y), Sample { index, seed })
+                let place = corner + sample_2d(index, PIXEL, seed);
+                self.radiance(&picture.ray(place.x, place.y), &center, Sample { index, seed })
             })
             .sum();
         sum / count as f32
     }
 
-    /// Radiance along a ray, surfaces that let light through composited front to back.
-    fn radiance(&self, ray: &CameraRay, sample: Sample) -> Vec3 {
-        let view = -ray.direction;
+    /// The surfaces that a pixel's centre shows, the nearest first.
+    fn center(&self, ray: &CameraRay, seed: u32) -> Vec<Place> {
+        let mut places = Vec::new();
+        let (mut start, mut through) = (0.0, Vec3::ONE);
+        while places.len() < MAX_LAYERS && through.max_element() >= INVISIBLE {
+            let bvh = self.scene.geometry.bvh();
+            let Some(hit) = bvh.closest_hit(ray.origin, ray.direction, start, f32::INFINITY) else { break };
+            start = hit.distance;
+            let mut place = Place::new(self.scene, hit, ray);
+            if self.is_hidden(&place) {
+                continue;
+            }
+            let sample = Sample { index: 0, seed };
+            let shading = self.shading(&place, sample);
+            through *= 1.0 - shading.opacity + shading.opacity * shading.transmitted;
+            if self.is_steady(place.point.material) {
+                place.shown = Some((shading, self.reflected(&shading, &place, sample)));
+            }
+            places.push(place);
+        }
+        places
+    }
+
+    /// Whether it is the back of a surface that has none.
+    fn is_hidden(&self, place: &Place) -> bool {
+        !self.scene.materials[place.point.material].double_sided && place.shows_back()
+    }
+
+    /// Whether what a material reflects does not depend on the sample.
+    fn is_steady(&self, material: usize) -> bool {
+        let material = &self.scene.materials[material];
+        let by_texel = matches!(self.settings.filtering, TextureFiltering::Texels { .. });
+        let by_light = self.settings.env_samples > 0 && self.scene.surroundings.is_some();
+        !by_texel && !by_light && material.skin.is_none() && material.fuzz.is_none()
+    }
+
+    fn shading(&self, place: &Place, sample: Sample) -> Shading {
+        let material = &self.scene.materials[place.point.material];
+        let range = self.scene.geometry.curvature_range();
+        let filtering = self.settings.filtering.of_sample(sample.index, sample.seed);
+        Shading::new(material, &place.point, place.view, filtering, range)
+    }
+
+    /// Radiance along a ray, surfaces that let light through composited front to back; those of `center` are shaded there.
+    fn radiance(&self, ray: &CameraRay, center: &[Place], sample: Sample) -> Vec3 {
         let mut seen = Vec3::ZERO;
         let mut through = Vec3::ONE;
         let mut start = 0.0;
@@ -248,38 +365,31 @@ impl Renderer<'_> {
                 return seen + through * self.background(ray.direction, sample);
             };
             start = hit.distance;
-            let point = self.scene.geometry.surface_point(&hit, ray);
-            let material = &self.scene.materials[point.material];
-            if !material.double_sided && point.geometric_normal.dot(view) <= 0.0 {
+            let own = Place::new(self.scene, hit, ray);
+            if self.is_hidden(&own) {
                 continue;
             }
-            let shading = Shading::new(
-                material,
-                &point,
-                view,
-                self.settings.filtering,
-                self.scene.geometry.curvature_range(),
-            );
-            if shading.opacity > 0.0 {
-                seen += through * shading.opacity * self.reflected(&shading, &point, &hit, view, sample);
-            }
+            let place = center.iter().find(|place| place.reaches(&own)).unwrap_or(&own);
+            let (shading, reflected) = match place.shown {
+                Some(shown) => shown,
+                None => {
+                    let shading = self.shading(place, sample);
+                    let is_seen = shading.opacity > 0.0;
+                    (shading, if is_seen { self.reflected(&shading, place, sample) } else { Vec3::ZERO })
+                }
+            };
+            seen += through * shading.opacity * reflected;
             through *= 1.0 - shading.opacity + shading.opacity * shading.transmitted;
-            // Half a code of an 8-bit display.
-            if through.max_element() < 1.0 / 512.0 {
+            if through.max_element() < INVISIBLE {
                 break;
             }
         }
         seen
     }
 
-    fn reflected(
-        &self,
-        shading: &Shading,
-        point: &SurfacePoint,
-        hit: &Hit,
-        view: Vec3,
-        sample: Sample,
-    ) -> Vec3 {
+    fn reflected(&self, shading: &Shading, place: &Place, sample: Sample) -> Vec3 {
+        let Place { hit, point, view, .. } = place;
+        let view = *view;
         let mut sum = shading.emitted;
         let to_shading = shading.frame.transpose();
         for light in &self.scene.lights {

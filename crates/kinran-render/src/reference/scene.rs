@@ -26,12 +26,24 @@ pub struct SurfaceTextures {
     pub aniso: BoundTexture,
     /// How squared roughness is held.
     pub encoding: AnisoEncoding,
+    /// Base colour and metalness that were filtered with them.
+    pub colors: Option<ColorTextures>,
+}
+
+/// Base colour and metalness, in the place of a material's own; for surfaces of [`AnisoEncoding::Texel`], which ask no other
+/// texture for roughness.
+#[derive(Clone, Debug)]
+pub struct ColorTextures {
+    /// Linear RGBA.
+    pub base_color: BoundTexture,
+    /// B metallic.
+    pub metallic: BoundTexture,
 }
 
 impl SurfaceTextures {
     /// Textures in Kinran's own form.
     pub fn new(normal: BoundTexture, aniso: BoundTexture) -> Self {
-        SurfaceTextures { normal, aniso, encoding: AnisoEncoding::Texel }
+        SurfaceTextures { normal, aniso, encoding: AnisoEncoding::Texel, colors: None }
     }
 }
 
@@ -114,6 +126,22 @@ pub struct RenderMaterial {
     pub fuzz: Option<RenderFuzz>,
     /// Maps blended from tiles, in the place of those above.
     pub detail: Option<RenderDetail>,
+}
+
+impl RenderMaterial {
+    fn surface_colors(&self) -> Option<&ColorTextures> {
+        self.surface.as_ref()?.colors.as_ref()
+    }
+
+    /// Its base colour as it is drawn: that of its surface, or its own.
+    pub(crate) fn drawn_base_color(&self) -> Option<&BoundTexture> {
+        self.surface_colors().map(|colors| &colors.base_color).or(self.base_color.as_ref())
+    }
+
+    /// The same for metalness.
+    pub(crate) fn drawn_metallic_roughness(&self) -> Option<&BoundTexture> {
+        self.surface_colors().map(|colors| &colors.metallic).or(self.metallic_roughness.as_ref())
+    }
 }
 
 /// Light from all around and its order-2 irradiance.

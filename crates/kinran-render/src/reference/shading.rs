@@ -7,7 +7,7 @@
 
 use super::{
     albedo::specular_albedo,
-    bound::{sample, sample_bound},
+    bound::{sample, sample_lobe},
     diffuse::diffuse_lobe,
     fuzz::FuzzAt,
     geometry::{N_V_MIN, SurfacePoint},
@@ -57,14 +57,14 @@ pub(crate) struct Shading {
 /// Base colour and alpha.
 fn base_color(material: &RenderMaterial, point: &SurfacePoint, filtering: TextureFiltering) -> Vec4 {
     let map = material.detail.as_ref().and_then(|detail| detail.at(DetailMap::BaseColor, point, filtering));
-    let map = map.unwrap_or_else(|| sample(&material.base_color, point, filtering));
+    let map = map.unwrap_or_else(|| sample(material.drawn_base_color(), point, filtering));
     material.base_color_factor * point.color * map
 }
 
 /// Reflectance at normal incidence of what is not metal, and the share that there is of it.
 fn dielectric(material: &RenderMaterial, point: &SurfacePoint, filtering: TextureFiltering) -> (Vec3, f32) {
     let Some(dielectric) = &material.dielectric else { return (Vec3::splat(DIELECTRIC_F0), 1.0) };
-    let map = sample(&dielectric.map, point, filtering);
+    let map = sample(dielectric.map.as_ref(), point, filtering);
     let (f0, strength) = (dielectric.f0 * map.xyz(), dielectric.strength * map.w);
     (f0.clamp(Vec3::ZERO, Vec3::ONE), strength.clamp(0.0, 1.0))
 }
@@ -116,8 +116,8 @@ impl Shading {
     ) -> Self {
         debug_assert!(view.is_normalized(), "a view of length {}", view.length());
         let base = base_color(material, point, filtering);
-        let own = sample(&material.metallic_roughness, point, filtering);
-        let own_occlusion = sample(&material.occlusion, point, filtering).x;
+        let own = sample(material.drawn_metallic_roughness(), point, filtering);
+        let own_occlusion = sample(material.occlusion.as_ref(), point, filtering).x;
         let detail = |map| material.detail.as_ref()?.at(map, point, filtering);
         let data = detail(DetailMap::Data);
         let channels = material.detail.as_ref().map_or([None; 3], |detail| detail.detail.channels);
@@ -130,10 +130,10 @@ impl Shading {
         let blended = detail(DetailMap::Normal).map(|n| n.xyz());
         let (n, texel) = match &material.surface {
             Some(surface) => {
-                let xy = sample_bound(&surface.normal, point, filtering).xy() * 2.0 - 1.0;
+                let [normal, texel] = sample_lobe([&surface.normal, &surface.aniso], point, filtering);
+                let xy = normal.xy() * 2.0 - 1.0;
                 let n = blended.unwrap_or_else(|| normal_from_xy(xy.x, xy.y));
-                let texel = sample_bound(&surface.aniso, point, filtering).xyz();
-                (n, surface.encoding.texel(texel, roughness, n))
+                (n, surface.encoding.texel(texel.xyz(), roughness, n))
             }
             None => {
                 let alpha = alpha_from_roughness(roughness);
@@ -165,8 +165,8 @@ impl Shading {
         let passed = base.xyz() * (1.0 - metallic) * inside;
         let (scattered, translucent) = match &material.translucency {
             Some(t) => {
-                let share = (t.factor * sample(&t.map, point, filtering).w).clamp(0.0, 1.0);
-                let color = t.color_factor * sample(&t.color, point, filtering).xyz();
+                let share = (t.factor * sample(t.map.as_ref(), point, filtering).w).clamp(0.0, 1.0);
+                let color = t.color_factor * sample(t.color.as_ref(), point, filtering).xyz();
                 (passed * (1.0 - share), color * share * (1.0 - metallic) * inside)
             }
             None => (passed, Vec3::ZERO),
@@ -187,7 +187,7 @@ impl Shading {
             translucent: translucent * opaque,
             transmitted: passed * (1.0 - opaque),
             occlusion: 1.0 + material.occlusion_strength * (occlusion - 1.0),
-            emitted: material.emissive_factor * sample(&material.emissive, point, filtering).xyz(),
+            emitted: material.emissive_factor * sample(material.emissive.as_ref(), point, filtering).xyz(),
             opacity: opacity(material, base),
             skin: material
                 .skin

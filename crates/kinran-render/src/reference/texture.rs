@@ -4,9 +4,10 @@
 //! Scale Factor Operation, LOD Operation, Texel Anisotropic Filtering. u runs right, v down, (0, 0) is the
 //! corner of the first texel.
 
+use super::sampler::sample_2d;
 use glam::{Vec2, Vec4, vec2};
 use kinran_image::srgb::linear_of_codes;
-use kinran_image::{Image, Texture, Transfer};
+use kinran_image::{Image, Texture, Transfer, full_level_count, level_size};
 use kinran_scene::Wrap;
 use std::sync::Arc;
 
@@ -21,7 +22,44 @@ pub enum TextureFiltering {
     },
     /// Bilinear from level 0, the pixel's many samples being the filter: ground truth.
     Level0,
+    /// For every sample one place, read from level 0 as [`TextureFiltering::Level0`] reads it and chosen as often as it counts
+    /// in [`TextureFiltering::Mips`]: texels are shaded one by one, and averaged after that by the sampler's own kernel. The
+    /// mean of many samples is what mips would show that lost nothing. Textures of one size and place choose the same place.
+    Texels {
+        /// As in [`TextureFiltering::Mips`].
+        max_anisotropy: u32,
+        /// Normals and roughness alone; textures of colours and masks are read as [`TextureFiltering::Mips`] says. Alpha of the
+        /// normals then says how much a texel counts besides.
+        lobes_only: bool,
+        /// Which of a pixel's samples, and the pixel's seed; [`render`](super::render) sets them.
+        sample: [u32; 2],
+    },
 }
+
+impl TextureFiltering {
+    /// The most places along a slanted footprint; none where no mips are read.
+    pub(crate) fn max_anisotropy(self) -> Option<u32> {
+        match self {
+            TextureFiltering::Mips { max_anisotropy } | TextureFiltering::Texels { max_anisotropy, .. } => {
+                Some(max_anisotropy)
+            }
+            TextureFiltering::Level0 => None,
+        }
+    }
+
+    /// The same for one sample of a pixel.
+    pub(crate) fn of_sample(self, index: u32, seed: u32) -> Self {
+        match self {
+            TextureFiltering::Texels { max_anisotropy, lobes_only, .. } => {
+                TextureFiltering::Texels { max_anisotropy, lobes_only, sample: [index, seed] }
+            }
+            filtering => filtering,
+        }
+    }
+}
+
+/// The pairs of the sample sequence by which texels are chosen.
+const TEXEL: [u32; 3] = [5, 6, 7];
 
 /// One level of a [`MipTexture`].
 #[derive(Clone, Debug, PartialEq)]
@@ -130,26 +168,77 @@ impl MipTexture {
         if self.levels.len() == 1 {
             return self.sample_level(uv, 0);
         }
+        let footprint = self.footprint(uv_dx, uv_dy, max_anisotropy);
+        let count = footprint.count;
+        if count == 1 {
+            return self.sample_lod(uv, footprint.lod);
+        }
+        let sum: Vec4 = (0..count).map(|i| self.sample_lod(uv + footprint.offset(i), footprint.lod)).sum();
+        sum / count as f32
+    }
+
+    /// Where [`MipTexture::sample_grad`] reads.
+    #[inline]
+    fn footprint(&self, uv_dx: Vec2, uv_dy: Vec2, max_anisotropy: u32) -> Footprint {
         let size = self.size();
         let (rho_x, rho_y) = ((uv_dx * size).length(), (uv_dy * size).length());
         let (rho_max, rho_min) = (rho_x.max(rho_y), rho_x.min(rho_y));
         if max_anisotropy <= 1 || rho_max <= 1.0 {
-            return self.sample_lod(uv, libm::log2f(rho_max));
+            return Footprint { lod: libm::log2f(rho_max), axis: Vec2::ZERO, count: 1 };
         }
-
         // eta of the specification; a degenerate footprint takes the whole ratio.
         let eta = (rho_max / rho_min.max(f32::MIN_POSITIVE)).min(max_anisotropy as f32);
-        let lod = libm::log2f(rho_max / eta);
         let axis = if rho_x > rho_y { uv_dx } else { uv_dy };
-        let count = eta.ceil();
-        let sum: Vec4 = (1..=count as u32)
-            .map(|i| self.sample_lod(uv + axis * (i as f32 / (count + 1.0) - 0.5), lod))
-            .sum();
-        sum / count
+        Footprint { lod: libm::log2f(rho_max / eta), axis, count: eta.ceil() as u32 }
+    }
+
+    /// A place in what [`MipTexture::sample_grad`] averages, chosen as often as it counts there. Only the size of level 0 matters: mips are averages over areas, whether they are there or not.
+    pub(crate) fn texel(
+        &self,
+        uv: Vec2,
+        (uv_dx, uv_dy): (Vec2, Vec2),
+        max_anisotropy: u32,
+        [index, seed]: [u32; 2],
+    ) -> Vec2 {
+        let [place, tap, inside] = TEXEL.map(|pair| sample_2d(index, pair, seed));
+        let footprint = self.footprint(uv_dx, uv_dy, max_anisotropy);
+        let uv = uv + footprint.offset((place.x * footprint.count as f32) as u32);
+        let MipLevel { width, height, .. } = self.levels[0];
+        let lod = footprint.lod.clamp(0.0, (full_level_count(width, height) - 1) as f32);
+        let level = lod as usize + usize::from(place.y < lod.fract());
+        if level == 0 {
+            return uv;
+        }
+        let axis = |i: usize, side: u32| {
+            let size = level_size(side, level) as f32;
+            let x = uv[i] * size - 0.5;
+            let first = x.floor();
+            let texel = first + f32::from(u8::from(tap[i] < x - first));
+            let texel = if self.wrap[i] == Wrap::Clamp { texel.clamp(0.0, size - 1.0) } else { texel };
+            (texel + inside[i]) / size
+        };
+        vec2(axis(0, width), axis(1, height))
     }
 
     fn size(&self) -> Vec2 {
         vec2(self.levels[0].width as f32, self.levels[0].height as f32)
+    }
+}
+
+/// A pixel's footprint as a sampler reads it.
+struct Footprint {
+    /// Unclamped.
+    lod: f32,
+    /// Along it lie the places where it is read.
+    axis: Vec2,
+    count: u32,
+}
+
+impl Footprint {
+    /// From the middle to one of the places.
+    #[inline]
+    fn offset(&self, i: u32) -> Vec2 {
+        self.axis * ((i + 1) as f32 / (self.count as f32 + 1.0) - 0.5)
     }
 }
 

@@ -10,7 +10,7 @@ use kinran_bake::{bake_cutout, bake_plain, pack_channels};
 use kinran_image::{Encoding, Files, Image, Role, Transfer};
 use rayon::prelude::*;
 
-use super::together::{together, why_apart};
+use super::together::{color_texture, together, why_apart};
 use super::{file_name, file_stem, mip_texels, put_texture};
 use crate::content::Content;
 use crate::options::{Form, TextureOptions};
@@ -200,9 +200,11 @@ fn bake_material(
         let apart = reflectance.as_ref().and_then(|reflectance| why_apart(&material.name, reflectance, maps));
         warnings.extend(apart);
         let cutoff = how.textures.alpha_coverage.of_folder();
-        let together = together(maps, reflectance.as_ref(), cutoff, &name, &how.textures, task)?;
-        chosen = together.color;
-        let (maps, metallic_levels) = (&together.maps, &together.metallic);
+        let kernel = how.textures.kernel;
+        let together = together(maps, reflectance.as_ref(), cutoff, &name, kernel, task)?;
+        let pair = together.pair.as_ref();
+        chosen = pair.map(|pair| color_texture(pair, &name, &how.textures, task)).transpose()?;
+        let (maps, metallic_levels) = (&together.maps, pair.map_or(&[][..], |pair| &pair.metallic));
         let size = maps.size();
         // One image that holds occlusion and metalness where glTF wants them is packed as it is.
         let packed = match (occlusion, metallic) {

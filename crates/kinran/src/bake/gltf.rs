@@ -22,7 +22,7 @@ use kinran_scene::{
 use serde_json::Value;
 
 use super::gltf_options::GltfOptions;
-use super::together::{together, why_apart};
+use super::together::{color_texture, together, why_apart};
 use super::{curvature, file_name, file_stem, mip_texels, put_texture};
 use crate::content::Content;
 use crate::options::TextureOptions;
@@ -705,8 +705,11 @@ impl SurfaceBaker<'_> {
         let m = &self.scene.materials[materials[0]];
         let reflectance = surface.reflectance.as_ref();
         let cutoff = options.alpha_coverage.of_material(m);
-        let together = together(&surface.maps.maps, reflectance, cutoff, &m.name, options, self.task)?;
-        let (maps, metallic) = (&together.maps, &together.metallic);
+        let kernel = options.kernel;
+        let together = together(&surface.maps.maps, reflectance, cutoff, &m.name, kernel, self.task)?;
+        let pair = together.pair.as_ref();
+        let color = pair.map(|pair| color_texture(pair, &m.name, options, self.task)).transpose()?;
+        let (maps, metallic) = (&together.maps, pair.map_or(&[][..], |pair| &pair.metallic));
         let size = maps.size();
         let mr = m.metallic_roughness.as_ref().and_then(|place| self.scene.images[place.image].clone());
 
@@ -765,7 +768,7 @@ impl SurfaceBaker<'_> {
             self.place_aniso(&outputs, materials);
             report.outputs.extend(outputs);
         }
-        Ok((report, together.color))
+        Ok((report, color))
     }
 
     /// Writes a texture and puts it into its slot of every material.

@@ -21,6 +21,7 @@ pub use curvature::{Joined, measured, meshes, pose_scale, triangles_of, unit};
 pub use folder::{FolderOptions, folder, folder_plan, understand};
 pub use gltf::{Understood, gltf, gltf_space, texel_remarks, understand_gltf};
 pub use gltf_options::{CurvatureOptions, Dump, GltfOptions, Which};
+pub use together::{Together, together, why_apart};
 
 impl TextureOptions {
     /// The space of a texture's files.

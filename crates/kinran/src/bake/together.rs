@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use kinran_bake::aniso::{Reflectance, ReflectanceMaps, SurfaceMaps};
-use kinran_bake::metal::{Apart, apart, base_and_metal};
+use kinran_bake::aniso::{Kernel, Reflectance, ReflectanceMaps, SurfaceMaps};
+use kinran_bake::metal::{Apart, BaseAndMetal, apart, base_and_metal};
 use kinran_bake::{compress_levels, keep_coverage};
-
 use kinran_image::{Role, Texture, Transfer};
 
 use super::mip_texels;
@@ -14,26 +13,29 @@ use crate::options::TextureOptions;
 use crate::{Error, Stage, Task};
 
 /// A surface that knows what it reflects.
-pub(super) struct Together {
+#[derive(Clone, Debug)]
+pub struct Together {
     /// Its maps, with weights where its texels do not all reflect the same.
-    pub(super) maps: SurfaceMaps,
-    /// Base colour, where its levels are chosen together with those of metalness.
-    pub(super) color: Option<Texture>,
-    /// Levels of metalness; none where they are averaged.
-    pub(super) metallic: Vec<Vec<u8>>,
+    pub maps: SurfaceMaps,
+    /// Base colour and metalness of its levels, where they are chosen together.
+    pub pair: Option<BaseAndMetal>,
 }
 
-/// Filters base colour and metalness of a surface, and weighs its texels; as it is where nothing is said of what it reflects.
-/// The base colour is cut out at `cutoff` where there is one.
-pub(super) fn together(
+/// Weighs the texels of a surface, and chooses base colour and metalness of its levels, where they can be; the maps as they are
+/// where nothing is said of what they reflect. The base colour is cut out at `cutoff` where there is one. `name` is that of the
+/// material.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn together(
     maps: &SurfaceMaps,
     reflectance: Option<&Reflectance>,
     cutoff: Option<f32>,
     name: &str,
-    how: &TextureOptions,
+    kernel: Kernel,
     task: Task<'_>,
 ) -> Result<Together, Error> {
-    let mut together = Together { maps: maps.clone(), color: None, metallic: Vec::new() };
+    let mut together = Together { maps: maps.clone(), pair: None };
     let Some(reflectance) = reflectance else { return Ok(together) };
     let surface = maps.size();
     if together.maps.weights.is_none() {
@@ -42,10 +44,8 @@ pub(super) fn together(
     if apart(reflectance, surface).is_none() {
         let own = reflectance.size();
         let size = (own.0.max(surface.0), own.1.max(surface.1));
-        let texels = mip_texels(size) + mip_texels(own);
-        let choosing = task.begin(Stage::Averaging(Content::Color), name, texels)?;
-        let mut pair = match base_and_metal(reflectance, surface, how.kernel, &|texels| choosing.tick(texels))
-        {
+        let choosing = task.begin(Stage::Averaging(Content::Color), name, mip_texels(size))?;
+        let mut pair = match base_and_metal(reflectance, surface, kernel, &|texels| choosing.tick(texels)) {
             Ok(pair) => pair,
             Err(Apart::Cancelled(stopped)) => return Err(stopped.into()),
             Err(_) => return Ok(together),
@@ -55,20 +55,29 @@ pub(super) fn together(
             ReflectanceMaps::Specular(_) => None,
         };
         if let (Some(cutoff), Some(image)) = (cutoff, base) {
-            keep_coverage(image, cutoff, how.kernel, reflectance.wrap, &mut pair.color, &|_| {
-                choosing.tick(0)
-            })?;
+            let tick = |_| choosing.tick(0);
+            keep_coverage(image, cutoff, kernel, reflectance.wrap, &mut pair.color, &tick)?;
         }
-        let encoding = how.encoding(Role::Color, how.color_format);
-        let tick = |texels| choosing.tick(texels);
-        together.color = Some(compress_levels(&pair.color, Transfer::Srgb, encoding, &tick)?);
-        together.metallic = pair.metallic;
+        together.pair = Some(pair);
     }
     Ok(together)
 }
 
+/// A base colour that was chosen together with metalness, as a texture.
+pub(super) fn color_texture(
+    pair: &BaseAndMetal,
+    name: &str,
+    how: &TextureOptions,
+    task: Task<'_>,
+) -> Result<Texture, Error> {
+    let texels = pair.color.iter().map(|level| u64::from(level.width) * u64::from(level.height));
+    let compressing = task.begin(Stage::Averaging(Content::Color), name, texels.sum())?;
+    let encoding = how.encoding(Role::Color, how.color_format);
+    Ok(compress_levels(&pair.color, Transfer::Srgb, encoding, &|texels| compressing.tick(texels))?)
+}
+
 /// A sentence where base colour and metalness are averaged one by one though both vary.
-pub(super) fn why_apart(name: &str, reflectance: &Reflectance, maps: &SurfaceMaps) -> Option<String> {
+pub fn why_apart(name: &str, reflectance: &Reflectance, maps: &SurfaceMaps) -> Option<String> {
     let apart = apart(reflectance, maps.size())?;
     let is_loss = matches!(apart, Apart::Dielectric | Apart::Sizes(..));
     is_loss.then(|| format!("{name}: base colour and metalness are averaged one by one: {apart}"))
