@@ -213,7 +213,8 @@ fn picture(model: &Path, backend: &str, size: (usize, usize), env: &str) -> Vec<
     let size = format!("{}x{}", size.0, size.1);
     let run = Command::new(env!("CARGO_BIN_EXE_kinran"))
         .args(["--quiet", "render", model.to_str().unwrap(), "-o", output.to_str().unwrap()])
-        .args(["--backend", backend, "--size", &size, "--spp", "4", "--env", env, "--env-samples", "4"])
+        .args(["--backend", backend, "--size", &size, "--spp", "4", "--env", env])
+        .args(["--env-samples", "4"].into_iter().filter(|_| env != "none"))
         .args(["--light", "0.5,0.6,0.6", "--light", "-0.7,-0.2,0.4", "--no-shadows", "--from", "0,0,1"])
         .args(["--fov", "10", "--filter", "ml"])
         .output()

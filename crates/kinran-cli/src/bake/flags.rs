@@ -164,6 +164,7 @@ mod tests {
             ("exr-layer", "a.exr=View.Normal"),
             ("roughness", "0.25"),
             ("anisotropy", "0.25"),
+            ("alpha-coverage", "0.25"),
             ("curvature-range", "1"),
             ("curvature-blur", "none"),
             ("unit-mm", "5"),
