@@ -71,9 +71,9 @@ fn leaves_thin_out_from_afar() {
             let (before, after) =
                 (drawn(plain, f64::from(cutoff), wrap), drawn(kept, f64::from(cutoff), wrap));
             lost += i32::from((before - wanted).abs() > 0.5 * wanted);
-            // Eight bits of an alpha near the cutoff move its outline: 1 % of the square where a level has 16 texels a side;
-            // of fewer texels no outline of the right area can be had.
-            if kept.width.min(kept.height) >= 16 {
+            // Eight bits of an alpha near the cutoff move its outline by less than 1 % of the square; of fewer texels than four a
+            // side no outline of the right area can be had.
+            if kept.width.min(kept.height) >= 4 {
                 let apart = (after - wanted).abs();
                 assert!(
                     apart < 0.01,

@@ -165,3 +165,58 @@ fn a_model_s_mixed_metal_is_filtered_one_by_one() {
         assert_ne!(together[name], apart[name], "{name}");
     }
 }
+
+/// A material with bumps and `rest`, of whose images `missing` is not there; its base colours stay as they are.
+fn bake_material(rest: &str, missing: &str, correlated: bool) -> Baked {
+    let json = r#"{
+      "asset": { "version": "2.0" },
+      "extensionsUsed": ["KHR_materials_specular"],
+      "materials": [{ "name": "armour", "normalTexture": { "index": 0 }, REST }],
+      "textures": [{ "source": 0 }, { "source": 1 }, { "source": 2 }],
+      "images": [{ "uri": "bumps.png" }, { "uri": "color.png" }, { "uri": "metal.png" }]
+    }"#;
+    let files: Memory = [
+        ("model.gltf", json.replace("REST", rest).into_bytes()),
+        ("bumps.png", normals()),
+        ("color.png", png(SIZE, Channels::Rgba, 6, |v| v)),
+        ("metal.png", png(SIZE, Channels::Rgb, 7, patches)),
+    ]
+    .into_iter()
+    .filter(|(name, _)| *name != missing)
+    .collect();
+    let mut how = GltfOptions::default();
+    (how.textures.correlated, how.textures.encoder) = (correlated, Some(Encoder::Portable));
+    let out = Memory::new();
+    let report = gltf(&files, Path::new("model.gltf"), &how, &out, Task::QUIET).unwrap();
+    (written(&out), vec![report])
+}
+
+/// Lobes are weighed by what the file says reflects, also where its colours are not baked; what cannot be read stops nothing.
+#[test]
+fn a_model_s_lobes_forget_what_reflects() {
+    let mixed = r#""pbrMetallicRoughness": { "baseColorTexture": { "index": 1 }, "metallicRoughnessTexture": { "index": 2 } }"#;
+    let gold = r#""pbrMetallicRoughness": { "baseColorTexture": { "index": 1 }, "roughnessFactor": 0.3 }"#;
+    let specular = |field: &str| {
+        format!(
+            r#""pbrMetallicRoughness": {{ "metallicFactor": 0, "roughnessFactor": 0.3 }},
+               "extensions": {{ "KHR_materials_specular": {{ "{field}": {{ "index": 1 }} }} }}"#
+        )
+    };
+    let paint = r#""pbrMetallicRoughness": { "baseColorTexture": { "index": 1 }, "metallicFactor": 0 }"#;
+    for (name, rest, missing, is_weighed) in [
+        ("mixed metal", mixed.to_owned(), "", true),
+        ("metal of many colours", gold.to_owned(), "", true),
+        ("a map of strength", specular("specularTexture"), "", true),
+        ("a map of specular colour", specular("specularColorTexture"), "", true),
+        ("paint", paint.to_owned(), "", false),
+        ("mixed metal whose colour is lost", mixed.to_owned(), "color.png", false),
+    ] {
+        let [(on, told), (off, _)] = [true, false].map(|on| bake_material(&rest, missing, on));
+        let textures: Vec<&String> = on.keys().filter(|name| name.ends_with(".ktx2")).collect();
+        assert!(textures.iter().all(|name| !name.contains("color")), "{name}: {textures:?}");
+        let normal = textures.iter().find(|name| name.contains("_normal")).unwrap();
+        assert_eq!(on[*normal] != off[*normal], is_weighed, "{name}: whether {normal} changes");
+        let warned = told[0].warnings.iter().any(|warning| warning.contains("what it reflects is not known"));
+        assert_eq!(warned, !missing.is_empty(), "{name}: {:?}", told[0].warnings);
+    }
+}
