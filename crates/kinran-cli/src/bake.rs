@@ -75,7 +75,8 @@ pub struct Args {
 
     /// Keeps as much of a colour at or above the cutoff of its alpha from afar as nearby, so that leaves and hair do not thin
     /// out: on is for glTF materials that are cut out, at their own cutoff; a number, 0 to 1, is the cutoff of a folder's
-    /// colour, or of whatever in a glTF file is not opaque; off averages alpha
+    /// colour, or of whatever in a glTF file is not opaque; off averages alpha. For colours of a glTF file it takes
+    /// --all-textures
     #[arg(long, value_name = "CUTOFF", default_value = "on", value_parser = alpha_coverage)]
     pub alpha_coverage: AlphaCoverage,
 

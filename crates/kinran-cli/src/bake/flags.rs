@@ -134,13 +134,21 @@ impl Args {
         Flag::given(self, |on| !on.acts(is_model))
     }
 
-    /// What to say of a flag about curvature where no curvature is measured.
-    pub(super) fn idle_curvature(&self) -> Option<String> {
-        let flag = Flag::given(self, |on| on == On::Curvature)?;
-        Some(format!(
-            "--{} has nothing to act on: no mesh is measured; --skin NAME or --curvature all asks for it",
-            flag.name
-        ))
+    /// A sentence for each flag that has nothing to act on in a glTF file, the curvature of whose meshes is `measured` or not.
+    pub(super) fn idle_on_model(&self, measured: bool) -> Vec<String> {
+        let curvature = Flag::given(self, |on| on == On::Curvature).filter(|_| !measured);
+        let no_mesh = "no mesh is measured; --skin NAME or --curvature all asks for it";
+        let no_color = "no colour is baked; --all-textures asks for it";
+        [
+            curvature.map(|flag| (flag.name, no_mesh)),
+            self.color_format.map(|_| ("color-format", no_color)).filter(|_| !self.all_textures),
+            (self.alpha_coverage != AlphaCoverage::Masked && !self.all_textures)
+                .then_some(("alpha-coverage", no_color)),
+        ]
+        .into_iter()
+        .flatten()
+        .map(|(flag, why)| format!("--{flag} has nothing to act on: {why}"))
+        .collect()
     }
 }
 

@@ -1,5 +1,6 @@
 //! `kinran bake` of a folder of authored maps.
 
+use kinran::options::AlphaCoverage;
 use kinran::report::{Report, SurfaceReport};
 use kinran::{Disk, Sink, bake};
 use kinran_bake::folder::{Folder, Role as MapRole, Row};
@@ -72,6 +73,8 @@ fn idle(args: &Args, rows: &[Row]) -> Vec<String> {
             missing("roughness"),
         ),
         ("color-space", args.color_space.is_some() && !has(&[Color]), missing("colour")),
+        ("color-format", args.color_format.is_some() && !has(&[Color]), missing("colour")),
+        ("alpha-coverage", args.alpha_coverage != AlphaCoverage::Masked && !has(&[Color]), missing("colour")),
     ];
     let given = flags.into_iter().filter(|(_, is_idle, _)| *is_idle);
     given.map(|(flag, _, why)| format!("--{flag} has nothing to act on: {why}")).collect()

@@ -13,7 +13,8 @@ use crate::{Console, Error};
 /// Bakes a glTF file and tells what came of it.
 pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let mut report = bake_gltf(args, console)?;
-    report.warnings.extend(args.idle_curvature().filter(|_| report.curvature.is_empty()));
+    let measured = !report.curvature.is_empty();
+    report.warnings.extend(args.idle_on_model(measured));
     for warning in &report.warnings {
         console.warn(warning);
     }
@@ -48,7 +49,7 @@ pub(super) fn dry_run(args: &Args, console: &Console) -> Result<(), Error> {
         report.surfaces.push(SurfaceReport { inputs, ..SurfaceReport::new(names[0].to_owned()) });
     }
     let measured = scene.primitives.iter().any(|p| how.wants(scene, p));
-    report.warnings.extend(args.idle_curvature().filter(|_| !measured));
+    report.warnings.extend(args.idle_on_model(measured));
     for warning in &report.warnings {
         console.warn(warning);
     }

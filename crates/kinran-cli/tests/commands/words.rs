@@ -113,12 +113,33 @@ fn a_dry_run_finds_less_than_the_bake() {
 }
 
 #[test]
+fn a_flag_for_colours_that_are_not_baked_is_swallowed() {
+    let (folder, model) = square();
+    let out = folder.path().join("out");
+    for flags in [["--alpha-coverage", "0.5"], ["--alpha-coverage", "off"], ["--color-format", "rgba8"]] {
+        let wanted = format!("{} has nothing to act on", flags[0]);
+        for more in ["--filter=linear", "--dry-run"] {
+            let words = [&["bake", text(&model), "-o", text(&out)], &flags[..], &[more]].concat();
+            let said = kinran(&words);
+            let is_told = said.err.contains(&wanted) && said.err.contains("--all-textures");
+            assert!(said.code == Some(0) && is_told, "{words:?}: wanted {wanted}: {}", said.err);
+            let said = kinran(&[&words[..], &["--all-textures"]].concat());
+            assert!(!said.err.contains("nothing to act on"), "{words:?} --all-textures: {}", said.err);
+        }
+    }
+    for wrong in ["1.5", "-0.1", "nan", "half"] {
+        let given = format!("--alpha-coverage={wrong}");
+        refused(&["bake", text(&model), "-o", text(&out), &given], &["--alpha-coverage", "0 to 1"]);
+    }
+}
+
+#[test]
 fn a_flag_for_maps_that_are_not_there_is_swallowed() {
     let folder = tempfile::tempdir().unwrap();
     let grey = Image::new(4, 4, Channels::R, Pixels::U8(vec![90; 16])).unwrap();
     write_png(&folder.path().join("tin_roughness.png"), &grey).unwrap();
     let out = folder.path().join("out");
-    let cases: [&[&str]; 7] = [
+    let cases: [&[&str]; 9] = [
         &["--roughness", "0.3"],
         &["--y-down"],
         &["--y-up"],
@@ -126,6 +147,8 @@ fn a_flag_for_maps_that_are_not_there_is_swallowed() {
         &["--force-normal"],
         &["--direction-span", "180"],
         &["--color-space", "linear"],
+        &["--color-format", "rgba8"],
+        &["--alpha-coverage", "0.5"],
     ];
     for flags in cases {
         for more in [&["-v"][..], &["--dry-run"]] {
