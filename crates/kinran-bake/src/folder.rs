@@ -201,12 +201,18 @@ pub struct Row {
 impl Row {
     /// Whether the file is a picture, or the row is about what no file gives.
     pub fn is_picture(&self) -> bool {
-        self.note != NO_PICTURE
+        self.note != NO_PICTURE && self.note != NOT_LOOKED_INTO
     }
 }
 
+/// The note of colour maps that are not opaque.
+pub const CUT_OUT: &str = "with alpha";
+
 /// The note of files that are none.
 const NO_PICTURE: &str = "no picture, not used";
+
+/// The note of folders beside maps.
+const NOT_LOOKED_INTO: &str = "a folder, not looked into; bake it by itself, or all of them by `kinran init`";
 
 /// A folder understood. Serializes as its rows, without paths.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -457,20 +463,21 @@ pub fn scan_in(files: &dyn Files, folder: &Path, hints: &Hints) -> Result<Folder
         .map(|file| file.file.clone())
         .collect();
     result.rows.extend(strangers.into_iter().map(|file| row_of("", file)));
-    let no_picture = |file| Row {
+    let unused = |file, note: &str| Row {
         material: String::new(),
         file,
         role: None,
         channels: "-".into(),
-        note: NO_PICTURE.into(),
+        note: note.into(),
     };
-    result.rows.extend(others.into_iter().map(no_picture));
+    result.rows.extend(others.into_iter().map(|file| unused(file, NO_PICTURE)));
 
     if result.materials.is_empty() {
         let mut seen: Vec<String> = result.rows.into_iter().map(|row| row.file).chain(folders).collect();
         seen.sort();
         return Err(FolderError::NoMaps { folder: folder.into(), seen });
     }
+    result.rows.extend(folders.iter().map(|folder| unused(format!("{folder}/"), NOT_LOOKED_INTO)));
     warn_of_tiles(&mut result.materials);
     warn_of_strangers(&mut result.materials, &unknown);
     name_layers(folder, hints, &mut result.materials)?;
@@ -612,6 +619,9 @@ fn list(files: &dyn Files, folder: &Path) -> Result<Listing, FolderError> {
         let more = list_one(files, &inner, &format!("{}/", file_name(&inner)))?;
         listing.found.extend(more.found);
         listing.others.extend(more.others);
+        let name = file_name(&inner);
+        listing.folders.retain(|folder| *folder != name);
+        listing.folders.extend(more.folders.into_iter().map(|folder| format!("{name}/{folder}")));
     }
     Ok(listing)
 }

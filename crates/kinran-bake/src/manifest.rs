@@ -45,6 +45,14 @@ use crate::patterns::PathPattern;
 /// Bytes of the manifest's text.
 pub type Place = Range<usize>;
 
+/// The name of `known` that a person who wrote `name` most likely meant; `None` where none is near. By the measure and the
+/// bound that clap has for flags: Jaro similarity above 0.7.
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let plain = name.trim_start_matches('-').replace('_', "-").to_lowercase();
+    let alike = known.into_iter().map(|known| (strsim::jaro(&plain, known), known));
+    alike.filter(|(likeness, _)| *likeness > 0.7).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, known)| known)
+}
+
 /// What is wrong in a manifest, and where. Prints as `FILE:LINE:COLUMN: what, and what was expected`.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("{}:{line}:{column}: {message}", path.display())]
@@ -236,11 +244,17 @@ impl Manifest {
                 "tile" => {}
                 name => {
                     let Some(kind) = Kind::ALL.into_iter().find(|kind| kind.name() == name) else {
-                        let kinds = Kind::ALL.map(|kind| format!("[[{}]]", kind.name())).join(", ");
+                        let kinds = Kind::ALL.map(Kind::name);
+                        let known =
+                            ["output", "cache", "cache-limit", "defaults", "tile"].into_iter().chain(kinds);
+                        let meant = nearest(name, known)
+                            .map_or_else(String::new, |meant| format!("did you mean `{meant}`? "));
+                        let kinds = kinds.map(|kind| format!("[[{kind}]]")).join(", ");
                         return Err(manifest.error(
                             &key.span(),
                             format!(
-                                "unknown key `{name}`; expected output, cache, cache-limit, [defaults], [tile.NAME], {kinds}"
+                                "unknown key `{name}`; {meant}expected output, cache, cache-limit, [defaults], \
+                                 [tile.NAME], {kinds}"
                             ),
                         ));
                     };

@@ -25,7 +25,8 @@ use crate::values::{CONTAINERS, Choices, FORMATS, PRESETS, SWITCH, choice, exr_l
 use crate::{Console, Error};
 
 pub use curvature::CurvatureArgs;
-pub use library::{LibraryArgs, LibraryReport, bake_library, cache_folder};
+pub use library::{LibraryArgs, LibraryReport, bake_library, cache_folder, library_report};
+pub use settings::options_of;
 
 /// Bakes a folder of authored maps, a glTF file or a whole library into textures with right mips
 ///
@@ -93,7 +94,7 @@ pub struct Args {
     pub container: Container,
 
     /// Zstandard level of KTX2 files, 0 for none
-    #[arg(long, value_name = "LEVEL", default_value_t = 3, value_parser = clap::value_parser!(i32).range(0..=22))]
+    #[arg(long, value_name = "LEVEL", default_value_t = DEFAULT_ZSTD, value_parser = clap::value_parser!(i32).range(0..=22))]
     pub zstd: i32,
 
     /// Format of normal maps [default: bc5]
@@ -188,6 +189,9 @@ pub struct Args {
     pub library: LibraryArgs,
 }
 
+/// Zstandard's own default: higher levels gain a few per cent of blocks, at many times the time.
+const DEFAULT_ZSTD: i32 = 3;
+
 /// `ROLE=FILE`.
 fn map(text: &str) -> Result<(MapRole, PathBuf), String> {
     let roles = || MapRole::all().map(MapRole::name).collect::<Vec<_>>().join(", ");
@@ -275,6 +279,15 @@ impl Args {
         how
     }
 
+    /// Refuses flags about textures that contradict each other.
+    fn check_textures(&self) -> Result<(), Error> {
+        if self.zstd != DEFAULT_ZSTD && self.container == Container::Dds {
+            let reason = "DDS files are not compressed; leave it out, or write KTX2";
+            return Err(Error::flag_error(format!("--zstd {}", self.zstd), reason));
+        }
+        Ok(self.textures().check()?)
+    }
+
     /// How a folder is baked.
     fn folder_options(&self) -> FolderOptions {
         let mut how = FolderOptions::default();
@@ -324,12 +337,23 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         let reason = format!("{}; name one, or leave it out", flag.refusal());
         return Err(Error::flag_error_of(&args.input, format!("--{}", flag.name), reason));
     }
-    args.textures().check()?;
+    args.check_textures()?;
     let gltf = is_gltf(&args.input);
     if args.input.is_file() && !gltf {
-        let reason = match has_extension(&args.input, "obj") {
-            true => "an OBJ brings no materials with maps; save it as .glb (Blender does) and bake that",
-            false => "is neither a folder of maps, a .glb or .gltf, nor a kinran.toml; name one of these",
+        let is = |extensions: &[&str]| extensions.iter().any(|e| has_extension(&args.input, e));
+        let reason = if is(&["obj"]) {
+            "an OBJ brings no materials with maps; save it as .glb (Blender does) and bake that"
+        } else if is(&["zip", "7z", "rar", "tar", "gz", "xz", "zst"]) {
+            "is an archive; unpack it and name the folder"
+        } else if is(&["sbsar", "sbs", "spp"]) {
+            "is a Substance file; export its maps into a folder and name that"
+        } else if is(&["fbx", "blend", "usd", "usda", "usdc", "usdz", "max", "ma", "mb", "dae", "stl", "ply"])
+        {
+            "is a model that is not read; save it as .glb (Blender does) and bake that"
+        } else if kinran_image::has_image_extension(&args.input) {
+            "is a single image; put the maps of a material into a folder and name that"
+        } else {
+            "is neither a folder of maps, a .glb or .gltf, nor a kinran.toml; name one of these"
         };
         return Err(Error::file_error(&args.input, reason));
     }
@@ -379,7 +403,17 @@ fn with_a_way(error: Error, console: &Console) -> Error {
         }
         Ok(survey) if !survey.is_empty() => {
             let way = format!("`kinran init {}` writes a {MANIFEST} for them", folder.display());
-            Error::file_error(folder, format!("holds no maps, but {}; {way}", survey.counts()))
+            Error::file_error(
+                folder,
+                format!("holds no maps, but {}{}; {way}", survey.counts(), survey.others()),
+            )
+        }
+        Ok(survey) if survey.left_out_as_baked().is_some() => {
+            let reason = survey.left_out_as_baked().unwrap_or_default();
+            Error::file_error(
+                folder,
+                format!("holds no maps, and what is below it cannot be baked: {reason}"),
+            )
         }
         _ => error,
     }

@@ -101,6 +101,11 @@ pub fn command() -> clap::Command {
 
 /// Does what the words of a command line ask for; the first is the program's name.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
+    ExitCode::from(run_words(words))
+}
+
+/// As [`run`], for programs that have this one inside: gives the exit code as a number.
+pub fn run_words(words: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = words.into_iter().collect();
     match Cli::try_parse_from(&words) {
         Ok(cli) => {
@@ -111,11 +116,11 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
             let bars = Some(Progress::new(!quiet && !json));
             let console = Console { quiet, verbose, json, bars };
             match start_threads(threads).and_then(|()| do_command(&command, &console)) {
-                Ok(()) => ExitCode::SUCCESS,
+                Ok(()) => 0,
                 Err(error) => {
                     kinran_image::remove_empty_folders();
                     console.failure(&error);
-                    ExitCode::from(error.exit_code())
+                    error.exit_code()
                 }
             }
         }
@@ -125,14 +130,14 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
                 let console = Console { json: true, ..Console::default() };
                 let said = misunderstood(&error);
                 console.failure(&said);
-                return ExitCode::from(said.exit_code());
+                return said.exit_code();
             }
             // Nobody is left to tell that the stream is closed.
             let _ = match error.render().to_string() {
                 text if text.contains("..=") => write!(stderr(), "{}", range_in_words(&text)),
                 _ => error.print(),
             };
-            ExitCode::from(error.exit_code() as u8)
+            error.exit_code() as u8
         }
     }
 }

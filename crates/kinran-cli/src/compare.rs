@@ -301,8 +301,19 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         series.flat_map(|name| args.distances.iter().map(move |distance| picture_file(name, *distance)));
     let pictures = pictures.chain(["compare.png".into(), "distance.png".into()]);
     args.view.refuse_inputs(&args.file, pictures.map(|picture| output.join(picture)))?;
+    if let Some(method) = repeated(&args.filters) {
+        let reason = format!("names {} twice; name each once", method.name());
+        return Err(Error::flag_error("--filters", reason));
+    }
+    if let Some(distance) = repeated(&args.distances) {
+        return Err(Error::flag_error("--distances", format!("has {distance} twice; name each once")));
+    }
     let file = model_at(&args.file)?;
     let scene = read_scene(&file, &args.view.model, &Needs::ALL, &console.progress())?;
+    args.view.refuse_idle(&scene, &file.to_string_lossy())?;
+    if Mips::of(&scene) == Mips::Baked {
+        console.note("the model is baked already: ground truth is level 0 of its own textures, and filters begin there");
+    }
     let view = View::new(&scene, &file.to_string_lossy(), &args.view)?;
     let options = Options {
         methods,
@@ -331,6 +342,11 @@ const NO_MAPS: &str = "no material has a normal, roughness or anisotropy map: th
 /// The name of a picture of a filter or of ground truth.
 pub(crate) fn picture_file(series: &str, distance: f32) -> String {
     format!("{series}_x{distance}.png")
+}
+
+/// The first value that stands there again.
+fn repeated<T: PartialEq>(values: &[T]) -> Option<&T> {
+    values.iter().enumerate().find(|(i, value)| values[..*i].contains(value)).map(|(_, value)| value)
 }
 
 /// The values without repetitions, in their order.

@@ -10,10 +10,11 @@ use kinran_scene::Document;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::outputs::has_extension;
+use crate::outputs::{has_extension, written_in};
 use crate::values::counted;
 use crate::{Console, Error, Progress, Stage};
 use kinran::detail::{MapKind, kind_of_role};
+use kinran::library::STATE;
 
 /// Writes a kinran.toml that lists what a folder holds, for `kinran bake kinran.toml`
 ///
@@ -174,6 +175,26 @@ impl Survey {
         parts.into_iter().flatten().collect::<Vec<_>>().join(" and ")
     }
 
+    /// ", 2 more cannot be baked: wood: no …"; empty where there is nothing else.
+    pub(crate) fn others(&self) -> String {
+        match self.left_out.as_slice() {
+            [] => String::new(),
+            left @ [first, ..] => {
+                format!(", and {} that cannot be baked ({}: {})", left.len(), first.path, first.reason)
+            }
+        }
+    }
+
+    /// Why what is there cannot be baked, where something is.
+    pub(crate) fn left_out_as_baked(&self) -> Option<String> {
+        let first = self.left_out.first()?;
+        let more = match self.left_out.len() - 1 {
+            0 => String::new(),
+            more => format!("; and {more} more"),
+        };
+        Some(format!("{}: {}{more}", first.path, first.reason))
+    }
+
     /// The manifest's text.
     fn manifest(&self) -> Result<String, Error> {
         let mut text = String::from(
@@ -295,9 +316,15 @@ impl Found {
             }
             children => children?,
         };
-        let ends = |ending: &str| children.iter().any(|path| path.to_string_lossy().ends_with(ending));
-        let is_output = full.join(".kinran").is_dir() || ends(".kinran.json") || ends(".detail.json");
-        if is_output && folder != Path::new("") {
+        if full.join(STATE).is_dir() && folder != Path::new("") {
+            return Ok(());
+        }
+        // What an earlier bake wrote; in a folder that was baked in place the maps are there still.
+        let ours = written_in(&full);
+        let is_output = !ours.is_empty();
+        let children: Vec<PathBuf> =
+            children.into_iter().filter(|path| !ours.contains(&root.join(path))).collect();
+        if children.is_empty() && is_output {
             return Ok(());
         }
         if children.is_empty() && folder != Path::new("") {
@@ -317,7 +344,8 @@ impl Found {
         // Maps in a folder called textures are those of the folder, but for the one that is looked through.
         let inner = inner_folder(&full);
         let apart = folder == Path::new("") && inner.is_some();
-        if !is_output && !apart && !named_maps(&full).unwrap_or_default().is_empty() {
+        let maps = named_maps(&full).unwrap_or_default();
+        if !apart && maps.iter().any(|(path, ..)| !ours.contains(path)) {
             self.folders.push(folder.to_path_buf());
         } else if !is_output && folder != Path::new("") && inner.is_none() && has_images {
             self.nameless.push(folder.to_path_buf());
@@ -347,8 +375,23 @@ impl Found {
             stage.add(1);
             match Document::open(root.join(&model)) {
                 Ok(document) => {
+                    let missing: Vec<PathBuf> =
+                        document.files().into_iter().filter(|file| !file.is_file()).collect();
+                    if let Some(first) = missing.first() {
+                        let more = match missing.len() {
+                            1 => String::new(),
+                            count => format!(" and {} more", count - 1),
+                        };
+                        let name = crate::outputs::file_name(first);
+                        self.leave_out(
+                            &model,
+                            format!("it names {name}{more}, which is not there; put it there"),
+                        );
+                    }
                     of_models.extend(document.files().iter().filter_map(|file| file.canonicalize().ok()));
-                    self.models.push(model);
+                    if missing.is_empty() {
+                        self.models.push(model);
+                    }
                 }
                 Err(error) => self.leave_out(&model, without(&error, &root.join(&model))),
             }

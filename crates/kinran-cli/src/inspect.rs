@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use kinran::content::Content;
 use kinran::inspect::{InspectOptions, Inspected, inspect};
-use kinran::{Disk, Finding};
+use kinran::{Checked, Disk, Finding};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -68,19 +68,50 @@ pub(crate) enum Report {
 pub(crate) struct CheckReport {
     file: String,
     kind: &'static str,
+    /// How many of the things that have rules are in it; a model that was never baked has none.
+    looked_at: usize,
     /// Nothing where all is well.
     findings: Vec<Finding>,
 }
 
 fn check(path: &Path, console: &Console) -> Result<(), Error> {
-    let findings = kinran::check(&Disk, path)?;
+    let Checked { looked_at, findings } = kinran::check(&Disk, path)?;
     let text = match findings.as_slice() {
+        [] if looked_at == 0 => {
+            format!(
+                "{}: holds nothing that `kinran bake` writes, so that no rule was looked at",
+                file_name(path)
+            )
+        }
         [] => format!("{}: all is well", file_name(path)),
         findings => findings.iter().map(|f| format!("{}: {}\n", f.place, f.problem)).collect(),
     };
     let count = findings.len();
-    console.result(&Report::Check(CheckReport { file: file_name(path), kind: "check", findings }), &text)?;
+    let report = CheckReport { file: file_name(path), kind: "check", looked_at, findings };
+    console.result(&Report::Check(report), &text)?;
     if count > 0 { Err(Error::Findings { path: path.to_path_buf(), count }) } else { Ok(()) }
+}
+
+/// What to say of a folder: which file in it, or which command, tells what was asked for.
+fn in_folder(folder: &Path) -> String {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| path.is_file()).collect();
+    files.sort();
+    let ends = |file: &&PathBuf, end: &str| file.to_string_lossy().to_ascii_lowercase().ends_with(end);
+    let is_model = |file: &&PathBuf| kinran_scene::is_gltf(file) || ends(file, ".obj");
+    let known = (files.iter().find(|file| ends(file, ".kinran.json")))
+        .or_else(|| files.iter().find(is_model))
+        .or_else(|| files.iter().find(|file| ends(file, ".ktx2") || ends(file, ".dds")));
+    match known {
+        Some(file) => format!("is a folder; name a file in it, such as `kinran inspect {}`", file.display()),
+        None if files.iter().any(|file| kinran_image::has_image_extension(file)) => {
+            let bake = format!("`kinran bake {} --dry-run`", folder.display());
+            format!("is a folder; {bake} tells what its maps are taken for, or name one image")
+        }
+        None => {
+            "is a folder without anything to look at; name a texture, a model, an image or a report".into()
+        }
+    }
 }
 
 /// The command.
@@ -88,6 +119,9 @@ fn check(path: &Path, console: &Console) -> Result<(), Error> {
 /// # Errors
 /// One that names the file: it cannot be read, it is damaged, it is of another kind.
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    if args.file.is_dir() {
+        return Err(Error::file_error(&args.file, in_folder(&args.file)));
+    }
     let _busy = console.progress().busy(format!("looking at {}", file_name(&args.file)));
     if args.check {
         return check(&args.file, console);

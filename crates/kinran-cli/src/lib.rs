@@ -20,7 +20,7 @@ pub mod fuzz_sheet;
 pub mod init;
 pub mod inspect;
 pub mod model;
-mod outputs;
+pub mod outputs;
 mod page;
 pub mod picture;
 mod progress;

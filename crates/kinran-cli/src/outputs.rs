@@ -2,7 +2,7 @@
 //! that can be refused is refused before long work, not after it.
 
 use std::collections::BTreeSet;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use kinran::report::{KnownFiles, WrittenFile};
@@ -73,7 +73,10 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 /// Refuses a folder that neither exists nor can be made, or that cannot be written to.
-pub(crate) fn check_folder(path: &Path) -> Result<(), Error> {
+///
+/// # Errors
+/// [`Error::File`] that names it.
+pub fn check_folder(path: &Path) -> Result<(), Error> {
     let existing = existing_folder(path);
     if !existing.is_dir() {
         // As it was typed, unless it is a part of that.
@@ -112,6 +115,42 @@ pub(crate) fn refuse_input<'a>(
     Ok(())
 }
 
+/// What the pictures of this program begin with: the software that a PNG's text and an EXR's attribute name.
+const SOFTWARE: &str = "Kinran";
+
+/// Bytes in which [`SOFTWARE`] stands: behind a PNG's size, and among an EXR's attributes.
+const PICTURE_HEAD: u64 = 4096;
+
+/// Bytes of a PNG before its second chunk: the signature, and a header of 13 bytes with length, name and checksum.
+const PNG_HEADER: usize = 8 + 4 + 4 + 13 + 4;
+
+/// A PNG with a text chunk that says who drew it.
+pub(crate) fn signed_png(mut png: Vec<u8>) -> Vec<u8> {
+    let chunk = format!("tEXtSoftware\0{SOFTWARE}");
+    let length = chunk.len() as u32 - 4;
+    let mut checksum = crc32fast::Hasher::new();
+    checksum.update(chunk.as_bytes());
+    let bytes =
+        length.to_be_bytes().into_iter().chain(chunk.bytes()).chain(checksum.finalize().to_be_bytes());
+    png.splice(PNG_HEADER..PNG_HEADER, bytes);
+    png
+}
+
+/// Refuses to overwrite a picture that kinran did not draw.
+///
+/// # Errors
+/// [`Error::File`].
+pub(crate) fn refuse_other_picture(picture: &Path) -> Result<(), Error> {
+    let Ok(file) = std::fs::File::open(picture) else { return Ok(()) };
+    let mut head = Vec::new();
+    file.take(PICTURE_HEAD).read_to_end(&mut head).map_err(|e| kinran_image::Error::io(picture, e))?;
+    if head.windows(SOFTWARE.len()).any(|bytes| bytes == SOFTWARE.as_bytes()) {
+        return Ok(());
+    }
+    let reason = "kinran did not draw this picture; name another with --output, or overwrite it with --force";
+    Err(Error::file_error(picture, reason))
+}
+
 /// Refuses to overwrite a page that kinran did not write, which is told by its title.
 pub(crate) fn refuse_other_page(page: &Path) -> Result<(), Error> {
     let Ok(text) = std::fs::read(page) else { return Ok(()) };
@@ -137,7 +176,8 @@ pub(crate) fn written_file(folder: &Path, file: impl Into<String>) -> Result<Wri
 }
 
 /// Where a bake's files go: a folder in which nothing of a person's is overwritten.
-pub(crate) struct Output<'a> {
+#[derive(Debug)]
+pub struct Output<'a> {
     folder: OutputFolder,
     input: &'a Path,
     force: bool,
@@ -147,7 +187,7 @@ pub(crate) struct Output<'a> {
 impl<'a> Output<'a> {
     /// For what is made of `input`; with `force` files that kinran did not write are overwritten all the same. The console is
     /// told where room may be short.
-    pub(crate) fn new(folder: &Path, input: &'a Path, force: bool, console: &'a Console) -> Self {
+    pub fn new(folder: &Path, input: &'a Path, force: bool, console: &'a Console) -> Self {
         Output { folder: OutputFolder::new(folder), input, force, console }
     }
 }
@@ -281,6 +321,15 @@ fn real(path: &Path) -> Option<PathBuf> {
     let full = std::path::absolute(path).ok()?;
     let there = full.ancestors().find(|part| part.exists())?;
     Some(there.canonicalize().ok()?.components().chain(full.strip_prefix(there).ok()?.components()).collect())
+}
+
+/// The files that reports in a folder name, and the reports: what was baked there.
+pub(crate) fn written_in(folder: &Path) -> BTreeSet<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let reports: Vec<PathBuf> =
+        entries.map(|e| e.path()).filter(|path| is_report(&path.to_string_lossy())).collect();
+    let files = known_files(folder).into_iter().map(|written| folder.join(written.file));
+    files.chain(reports).collect()
 }
 
 /// What the reports in a folder name.

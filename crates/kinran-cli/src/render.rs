@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use kinran_bake::aniso::Filter;
-use kinran_image::{Channels, Image, Pixels, write_exr, write_png};
+use kinran_image::{Channels, Image, Pixels, encode_png, write_atomically, write_exr};
 use kinran_render::reference::TextureFiltering;
 use kinran_scene::Scene;
 use schemars::JsonSchema;
@@ -15,7 +15,7 @@ use crate::model::Model;
 use crate::skin::missing_curvature;
 use crate::surfaces::{Method, Mips, scene_surfaces};
 use crate::values::{SWITCH, choice, counted};
-use crate::view::{View, ViewArgs, file_name};
+use crate::view::{Curve, View, ViewArgs, file_name};
 use crate::{Console, Error, outputs};
 
 /// Renders a glTF file, or a folder of baked textures
@@ -71,7 +71,7 @@ pub struct Args {
     pub correlated: bool,
 
     /// The most places along a slanted pixel's footprint at which a texture is read; 1 is trilinear
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=16))]
+    #[arg(long, value_name = "N", default_value_t = MAX_ANISOTROPY, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub max_anisotropy: u32,
 
     #[command(flatten)]
@@ -85,6 +85,9 @@ fn mips() -> impl TypedValueParser<Value = Mips> {
     PossibleValuesParser::new(all().map(mips_name))
         .map(move |name| all().find(|mips| mips_name(*mips) == name).expect("only names pass"))
 }
+
+/// What GPUs allow.
+const MAX_ANISOTROPY: u32 = 16;
 
 /// What `--filter` calls mips.
 fn mips_name(mips: Mips) -> &'static str {
@@ -135,11 +138,27 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if mips == Mips::Baked && own != Mips::Baked {
         return refuse("no material has its maps in KTX2 or DDS files; leave --filter out");
     }
+    let is_exr = outputs::has_extension(&output, "exr");
+    let sampled = "--filter none samples level 0 alone";
+    let own_mips = "the mips of the model's own files are drawn; name a filter to bake others";
+    let idle = [
+        ("--max-anisotropy", args.max_anisotropy != MAX_ANISOTROPY, mips == Mips::Level0, sampled),
+        ("--correlated off", !args.correlated, mips == Mips::Level0, sampled),
+        ("--correlated off", !args.correlated, mips == Mips::Baked, own_mips),
+    ];
+    if let Some((flag, .., why)) = idle.into_iter().find(|(_, given, is_idle, _)| *given && *is_idle) {
+        return Err(Error::flag_error_of(&path, flag, format!("{why}; leave the flag out")));
+    }
+    let has_curve = !matches!(args.view.tonemap, Curve::Aces | Curve::None);
+    let of_displays = [("--exposure", args.view.exposure != 0.0), ("--tonemap", has_curve)];
+    let unused = of_displays.into_iter().filter(|(_, given)| *given && is_exr);
+    let unused = unused
+        .map(|(flag, _)| format!("{flag} has nothing to act on: an EXR file is linear and not exposed"));
     let mips = mips.correlated(args.correlated);
     let drawn = if only_baked { Mips::Baked } else { mips };
     let (surfaces, apart) = scene_surfaces(&scene, drawn, &progress)?;
     let told = scene.warnings.iter().chain(view.environment_notes()).cloned();
-    let warnings: Vec<String> = told.chain(apart).chain(missing_curvature(&scene)).collect();
+    let warnings: Vec<String> = told.chain(apart).chain(missing_curvature(&scene)).chain(unused).collect();
     warnings.iter().for_each(|w| console.warn(w));
 
     let filtering = match mips {
@@ -149,7 +168,7 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let prepared = view.scene(&scene, surfaces, &progress)?;
     painter.left_out(&view, &prepared).iter().for_each(|what| console.warn(what));
     let film = painter.film(&view, &prepared, "render", args.spp, filtering, &progress)?;
-    if outputs::has_extension(&output, "exr") {
+    if is_exr {
         outputs::make_place(&output)?;
         let pixels = Pixels::F32(film.pixels.into_flattened());
         write_exr(&output, &Image::new(film.width, film.height, Channels::Rgb, pixels)?)?;
@@ -189,5 +208,6 @@ pub(crate) fn triangles(scene: &Scene) -> usize {
 pub(crate) fn write_rgb8(path: &Path, width: u32, height: u32, pixels: Vec<[u8; 3]>) -> Result<(), Error> {
     outputs::make_place(path)?;
     let pixels = Pixels::U8(pixels.into_flattened());
-    Ok(write_png(path, &Image::new(width, height, Channels::Rgb, pixels)?)?)
+    let png = encode_png(&Image::new(width, height, Channels::Rgb, pixels)?)?;
+    Ok(write_atomically(path, &outputs::signed_png(png))?)
 }

@@ -186,6 +186,19 @@ fn chosen(language: Language, name: Option<&str>) -> Result<Vec<Module>, Error> 
     Ok(modules.iter().filter(|module| wanted.contains(&module.name)).copied().collect())
 }
 
+/// The text of the library in a language by its name, or of a module with what it needs, for programs that print nothing.
+///
+/// # Errors
+/// [`Error::Flag`] for a language or a module that is not there, and a language that comes as files alone.
+pub fn text_of(language: &str, module: Option<&str>) -> Result<String, Error> {
+    let known = Language::from_str(language, true).map_err(|_| {
+        let all = Language::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+        let names: Vec<String> = all.map(|value| value.get_name().to_owned()).collect();
+        Error::flag_error(format!("--lang {language}"), format!("choose one of {}", names.join(", ")))
+    })?;
+    text(known, module, &chosen(known, module)?)
+}
+
 /// The module of a name, or all whose names begin with it and an underscore.
 fn named(modules: &[Module], name: &str) -> Vec<&'static str> {
     let all = || modules.iter().map(|module| module.name);

@@ -12,7 +12,7 @@ use kinran_render::tonemap::{Tonemap, to_srgb8};
 use kinran_scene::{Camera, Document, Environment, Light, LightKind, Scene};
 
 use crate::model::{ModelArgs, Place};
-use crate::outputs::refuse_input;
+use crate::outputs::{refuse_input, refuse_other_picture};
 use crate::skin::{SkinArgs, SkinCurvatureName, attach_skin};
 use crate::surfaces::fuzz_fits;
 use crate::values::{direction, number, size, vector};
@@ -23,7 +23,7 @@ pub(crate) use crate::outputs::file_name;
 /// Flags for camera, light and display that commands share.
 #[derive(Args, Clone, Debug)]
 pub struct ViewArgs {
-    /// Pixels, WIDTHxHEIGHT
+    /// Pixels, WIDTHxHEIGHT, or one number for a square
     #[arg(long, help_heading = "Picture", value_name = "WxH", default_value = "512x512", value_parser = size)]
     pub size: (u32, u32),
 
@@ -89,6 +89,10 @@ pub struct ViewArgs {
     #[arg(long, help_heading = "Picture", value_enum, default_value_t = Curve::Aces)]
     pub tonemap: Curve,
 
+    /// Overwrites pictures that kinran did not draw
+    #[arg(long, help_heading = "Picture")]
+    pub force: bool,
+
     #[command(flatten)]
     #[allow(missing_docs)]
     pub model: ModelArgs,
@@ -147,8 +151,8 @@ impl ViewArgs {
         }
     }
 
-    /// Refuses pictures that would overwrite the model, a file that it names, or the environment. Other pictures are
-    /// written again without a question, as renderers do.
+    /// Refuses pictures that would overwrite the model, a file that it names, the environment, or a picture that kinran did
+    /// not draw; its own are drawn again without a question.
     ///
     /// # Errors
     /// [`Error::File`] that names the picture.
@@ -166,7 +170,10 @@ impl ViewArgs {
             inputs.extend(Document::open(&file).map(|document| document.files()).unwrap_or_default());
             inputs.push(file);
         }
-        outputs.into_iter().try_for_each(|output| refuse_input(&output, inputs.iter().map(PathBuf::as_path)))
+        outputs.into_iter().try_for_each(|output| {
+            refuse_input(&output, inputs.iter().map(PathBuf::as_path))?;
+            if self.force { Ok(()) } else { refuse_other_picture(&output) }
+        })
     }
 }
 

@@ -72,6 +72,9 @@ pub struct Args {
 pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     if let Some(path) = &args.screenshot {
         crate::outputs::check_file(path, &["png"])?;
+        if !args.view.force {
+            crate::outputs::refuse_other_picture(path)?;
+        }
     }
     // A name that is mistyped is told before a window opens.
     args.file.as_deref().map(Place::of).transpose()?;

@@ -523,7 +523,7 @@ fn fixes_of_entries_are_words_of_the_command_line_alone() {
     fs::write(library.path("wall.png"), normals(1)).unwrap();
     library.describe("[[detail]]\ninput = \"wall.png\"\nlayer = [{ tile = \"wall.png\" }]\n");
     let (code, report, said) = library.bake(&[]);
-    let wanted = "(in the manifest: `kind = \"normal\"`, `kind = \"color\"`)";
+    let wanted = "(in the manifest: `kind = \"normal\"` or `kind = \"color\"`)";
     assert!(code == Some(2) && said.contains(wanted), "wanted {wanted} in {said}");
     let message = report["entries"][0]["error"]["message"].as_str().unwrap();
     assert!(message.ends_with(wanted), "wanted {wanted} at the end of {message}");

@@ -57,7 +57,8 @@ fn dxgi_format(format: Format, transfer: Transfer) -> DxgiFormat {
     }
 }
 
-/// Reads a DDS file: a 2D texture in one of our formats, or in 32 bits a texel with the channels in any order.
+/// Reads a DDS file: a 2D texture in one of our formats, or in 8 to 32 bits a texel with channels of whole bytes in any
+/// order, which become RGBA8.
 ///
 /// Headers that are older than DirectX 10 (`DXT1`, `ATI1`, `ATI2`, `BC4U`, `BC5U`, plain ones) and typeless formats do not
 /// say whether colour is sRGB: [`Transfer::Unsaid`], but for BC4 and BC5, which cannot be.
@@ -68,22 +69,30 @@ pub fn decode_dds(name: &Path, bytes: &[u8]) -> Result<Texture, Error> {
     parse(bytes).map_err(|reason| Error::malformed(name, format!("DDS: {reason}")))
 }
 
-/// A file's layout: the format its texels get, what is known of their colours, and for 32 bits a texel which byte holds
-/// red, green, blue and alpha.
-type Layout = (Format, Transfer, Option<[Option<usize>; 4]>);
+/// A file's layout: the format its texels get, what is known of their colours, and where the bytes of plain ones are.
+type Layout = (Format, Transfer, Option<Order>);
+
+/// Where texels of whole bytes have their channels.
+#[derive(Clone, Copy)]
+struct Order {
+    /// Bytes of a texel.
+    bytes: usize,
+    /// Which of them hold red, green, blue and alpha; what is not there is 255.
+    channels: [Option<usize>; 4],
+}
 
 fn parse(bytes: &[u8]) -> Result<Texture, String> {
     // Only the headers go through the parser, which would copy the texels.
     const HEADER: usize = 4 + 124;
     const HEADERS: usize = HEADER + 20;
     let head = &bytes[..bytes.len().min(HEADERS)];
-    let dds = Dds::read(head).map_err(|e| format!("{e}; the file is damaged or truncated"))?;
+    let dds = Dds::read(head).map_err(|e| format!("{e}; the file is damaged or truncated, save it again"))?;
     let (layout, data) = match &dds.header10 {
         Some(header10) => {
             let f = header10.dxgi_format;
             (modern(f).ok_or_else(|| format!("format {f:?}")), HEADERS)
         }
-        None => (legacy(&dds.header.spf), HEADER),
+        None => (legacy(&dds.header.spf, head), HEADER),
     };
     let (format, transfer, order) = layout
         .map_err(|format| format!("{format} is not read; convert to BC1, BC4, BC5, BC7, RGBA8 or RGBA16F"))?;
@@ -106,19 +115,21 @@ fn parse(bytes: &[u8]) -> Result<Texture, String> {
     let mut levels = Vec::with_capacity(level_count);
     for i in 0..level_count {
         let (width, height) = (level_size(width, i), level_size(height, i));
-        let wanted = format.level_bytes(width, height);
+        let wanted = match order {
+            Some(order) => width as usize * height as usize * order.bytes,
+            None => format.level_bytes(width, height),
+        };
         let Some((data, after)) = rest.split_at_checked(wanted) else {
             let left = rest.len();
             return Err(format!(
                 "level {i}, {width}x{height} in {format:?}, needs {wanted} bytes, {left} are left"
             ));
         };
-        let mut data = data.to_vec();
-        if let Some(order) = order {
-            for texel in data.as_chunks_mut::<4>().0 {
-                *texel = order.map(|byte| byte.map_or(255, |byte| texel[byte]));
-            }
-        }
+        let texel = |order: Order, texel: &[u8]| order.channels.map(|at| at.map_or(255, |at| texel[at]));
+        let data = match order {
+            Some(order) => data.chunks_exact(order.bytes).flat_map(|t| texel(order, t)).collect(),
+            None => data.to_vec(),
+        };
         levels.push(Level { width, height, data });
         rest = after;
     }
@@ -126,8 +137,8 @@ fn parse(bytes: &[u8]) -> Result<Texture, String> {
 }
 
 /// Blue first, as Windows has it.
-const BGRA: Option<[Option<usize>; 4]> = Some([Some(2), Some(1), Some(0), Some(3)]);
-const BGRX: Option<[Option<usize>; 4]> = Some([Some(2), Some(1), Some(0), None]);
+const BGRA: Option<Order> = Some(Order { bytes: 4, channels: [Some(2), Some(1), Some(0), Some(3)] });
+const BGRX: Option<Order> = Some(Order { bytes: 4, channels: [Some(2), Some(1), Some(0), None] });
 
 fn modern(format: DxgiFormat) -> Option<Layout> {
     use DxgiFormat as F;
@@ -155,8 +166,11 @@ fn modern(format: DxgiFormat) -> Option<Layout> {
     })
 }
 
+/// Where a header has the mask of red, or of grey.
+const RED_MASK: usize = 92;
+
 /// The layout that a header from before DirectX 10 describes, or what to call it where it is none of ours.
-fn legacy(pixels: &PixelFormat) -> Result<Layout, String> {
+fn legacy(pixels: &PixelFormat, head: &[u8]) -> Result<Layout, String> {
     /// `D3DFMT_A16B16G16R16F`.
     const HALF_FLOATS: u32 = 113;
     use Transfer::{Linear, Unsaid};
@@ -180,19 +194,27 @@ fn legacy(pixels: &PixelFormat) -> Result<Layout, String> {
         Some(0xff00_0000) => Some(3),
         _ => None,
     };
-    let rgb = [pixels.r_bit_mask, pixels.g_bit_mask, pixels.b_bit_mask].map(byte);
-    let alpha = pixels.a_bit_mask.filter(|mask| *mask != 0);
-    match rgb {
-        [Some(r), Some(g), Some(b)]
-            if pixels.flags.contains(PixelFormatFlags::RGB)
-                && pixels.rgb_bit_count == Some(32)
-                && alpha.is_none_or(|mask| byte(Some(mask)).is_some()) =>
-        {
-            Ok((Format::Rgba8, Unsaid, Some([Some(r), Some(g), Some(b), byte(alpha)])))
-        }
-        _ => Err(match pixels.rgb_bit_count {
-            Some(bits) => format!("a plain format of {bits} bits a texel"),
-            None => "a format without a name".into(),
-        }),
+    // The parser leaves out the mask of what is grey.
+    let red = head.get(RED_MASK..RED_MASK + 4).and_then(|mask| mask.try_into().ok()).map(u32::from_le_bytes);
+    let red = byte(red);
+    let color = if pixels.flags.contains(PixelFormatFlags::RGB) {
+        [red, byte(pixels.g_bit_mask), byte(pixels.b_bit_mask)]
+    } else if pixels.flags.contains(PixelFormatFlags::LUMINANCE) {
+        [red; 3]
+    } else {
+        [None; 3]
+    };
+    let alpha = pixels.a_bit_mask.filter(|mask| *mask != 0).map(|mask| byte(Some(mask)));
+    let bits = pixels.rgb_bit_count.unwrap_or(0);
+    let (bytes, channels) = (bits as usize / 8, [color[0], color[1], color[2], alpha.flatten()]);
+    let is_plain = bits.is_multiple_of(8)
+        && bytes <= 4
+        && color.iter().all(Option::is_some)
+        && alpha != Some(None)
+        && channels.iter().flatten().all(|&at| at < bytes);
+    match pixels.rgb_bit_count {
+        _ if is_plain => Ok((Format::Rgba8, Unsaid, Some(Order { bytes, channels }))),
+        Some(bits) => Err(format!("a plain format of {bits} bits a texel")),
+        None => Err("a format without a name".into()),
     }
 }

@@ -3,6 +3,9 @@ use std::path::{Path, PathBuf};
 
 use crate::Cancelled;
 
+/// What to say of a file whose end is missing.
+pub(crate) const TRUNCATED: &str = "the file ends too early, it is truncated; save it again";
+
 /// Why an image or a texture could not be read, written, encoded or decoded.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {

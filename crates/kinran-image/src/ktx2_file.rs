@@ -146,7 +146,7 @@ pub fn decode_ktx2(name: &Path, bytes: &[u8]) -> Result<Texture, Error> {
 fn parse(bytes: &[u8]) -> Result<Texture, String> {
     // The crate's Reader is not used: it also parses the data format descriptor, and panics on one whose
     // texel block has a side of 256. The format says all that is needed here.
-    let truncated = || "the file ends too early, it is truncated".to_string();
+    let truncated = || crate::error::TRUNCATED.to_string();
     let (head, rest) = bytes.split_first_chunk::<{ Header::LENGTH }>().ok_or_else(truncated)?;
     let header = Header::from_bytes(head).map_err(|e| format!("{e}; the file is damaged"))?;
     let Some((format, transfer)) = header.format.and_then(our_format) else {

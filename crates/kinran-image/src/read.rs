@@ -13,6 +13,7 @@ use image::codecs::{bmp::BmpDecoder, png::PngDecoder, tga::TgaDecoder, webp::Web
 use image::metadata::Orientation;
 use image::{ColorType, ImageDecoder, ImageError, Limits};
 
+use crate::error::TRUNCATED;
 use crate::image::{MAX_IMAGE_BYTES, MAX_SIDE, check_finite, check_sides};
 use crate::{Channels, Error, Image, Pixels, decode_texture};
 
@@ -109,7 +110,7 @@ fn decode<R: BufRead + Seek + Send>(
         ));
     }
     let image = match magic.as_slice() {
-        [] => return Err(Error::malformed(name, "the file is empty")),
+        [] => return Err(Error::malformed(name, "the file is empty; save it again, or leave it out")),
         [0x89, b'P', b'N', b'G', ..] => {
             let mut limits = Limits::no_limits();
             limits.max_alloc = Some(MAX_IMAGE_BYTES);
@@ -159,7 +160,7 @@ fn unknown_format(magic: &[u8]) -> String {
 fn check_riff(magic: &[u8], stored: u64) -> Result<(), String> {
     let length = magic.get(4..8).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes);
     if stored < u64::from(length) + 8 {
-        return Err("the file ends too early, it is truncated".into());
+        return Err(TRUNCATED.into());
     }
     Ok(())
 }
@@ -184,10 +185,8 @@ fn image_error(error: &ImageError) -> String {
     match error {
         ImageError::Unsupported(e) => format!("{e}; save it as an 8- or 16-bit PNG"),
         ImageError::Limits(e) => format!("{e}; it is too large, the longest side allowed is {MAX_SIDE}"),
-        ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
-            "the file ends too early, it is truncated".into()
-        }
-        e => format!("{}; the file is damaged or truncated", plain(&e.to_string())),
+        ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => TRUNCATED.into(),
+        e => format!("{}; the file is damaged or truncated, save it again", plain(&e.to_string())),
     }
 }
 

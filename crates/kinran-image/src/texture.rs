@@ -56,7 +56,8 @@ impl Texture {
             return fail(format!("a {w}x{h} texture has at most {most} levels, not {n}"));
         }
         if self.transfer == Transfer::Srgb && !self.format.has_srgb() {
-            return fail(format!("{:?} has no sRGB form; use linear, or BC1, BC7 or RGBA8", self.format));
+            let name = self.format.name();
+            return fail(format!("{name} has no sRGB form; use linear, or bc1, bc7 or rgba8"));
         }
         for (i, level) in self.levels.iter().enumerate() {
             let wanted = (level_size(first.width, i), level_size(first.height, i));

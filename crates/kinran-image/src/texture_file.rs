@@ -22,7 +22,7 @@ pub fn decode_texture(name: &Path, bytes: &[u8]) -> Result<Texture, Error> {
     match bytes {
         [b'D', b'D', b'S', b' ', ..] => decode_dds(name, bytes),
         _ if bytes.starts_with(&ktx2::MAGIC) => decode_ktx2(name, bytes),
-        [] => Err(Error::malformed(name, "the file is empty")),
+        [] => Err(Error::malformed(name, "the file is empty; write it again, or leave it out")),
         _ => Err(Error::malformed(name, "the file is neither KTX2 nor DDS; textures are read from these")),
     }
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use exr::prelude::{
-    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Layer, LayerAttributes, LineOrder,
+    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Layer, LayerAttributes, LineOrder, Text,
     WritableImage,
 };
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -314,7 +314,7 @@ fn encode_exr_to(
     };
     let layer = Layer::new(
         (size.0 as usize, size.1 as usize),
-        LayerAttributes::default(),
+        LayerAttributes { software_name: Text::new_or_none("Kinran"), ..LayerAttributes::default() },
         encoding,
         AnyChannels::sort(planes.collect()),
     );

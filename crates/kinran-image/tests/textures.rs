@@ -362,6 +362,8 @@ fn dds_files_of_old_writers_are_read() {
     let bgra = [0xff_0000, 0xff00, 0xff, 0xff00_0000];
     let rgba = [0xff, 0xff00, 0xff_0000, 0xff00_0000];
     let masked = |flags, masks| (flags, b"\0\0\0\0", 32, masks);
+    let plain = |flags, bits, masks| (flags, b"\0\0\0\0", bits, masks);
+    let [bgr, l, la] = [[0xff_0000, 0xff00, 0xff, 0], [0xff, 0, 0, 0], [0xff, 0, 0, 0xff00]];
     let texel = vec![51, 102, 153, 204];
     for (name, pixels, block, format, transfer, wanted) in [
         ("ATI2", four(b"ATI2"), &two, Format::Bc5, Transfer::Linear, [red, green, 0.0, 1.0]),
@@ -372,11 +374,32 @@ fn dds_files_of_old_writers_are_read() {
         ("BGRA", masked(0x41, bgra), &texel, Format::Rgba8, Transfer::Unsaid, [0.6, 0.4, 0.2, 0.8]),
         ("BGRX", masked(0x40, bgra), &texel, Format::Rgba8, Transfer::Unsaid, [0.6, 0.4, 0.2, 1.0]),
         ("RGBA", masked(0x41, rgba), &texel, Format::Rgba8, Transfer::Unsaid, [0.2, 0.4, 0.6, 0.8]),
+        (
+            "BGR",
+            plain(0x40, 24, bgr),
+            &texel[..3].to_vec(),
+            Format::Rgba8,
+            Transfer::Unsaid,
+            [0.6, 0.4, 0.2, 1.0],
+        ),
+        ("L", plain(0x2_0000, 8, l), &vec![51], Format::Rgba8, Transfer::Unsaid, [0.2, 0.2, 0.2, 1.0]),
+        (
+            "LA",
+            plain(0x2_0001, 16, la),
+            &vec![51, 204],
+            Format::Rgba8,
+            Transfer::Unsaid,
+            [0.2, 0.2, 0.2, 0.8],
+        ),
     ] {
         let (width, height) = (8, 4);
         let mut bytes = old_dds(pixels, width, height, 2);
-        let count: usize =
-            [(8, 4), (4, 2)].iter().map(|&(w, h)| format.level_bytes(w, h) / block.len()).sum();
+        // Blocks, or texels of as many bytes.
+        let texels = |w: u32, h: u32| (w * h) as usize;
+        let blocks = |w, h| {
+            if format == Format::Rgba8 { texels(w, h) } else { format.level_bytes(w, h) / block.len() }
+        };
+        let count: usize = blocks(8, 4) + blocks(4, 2);
         bytes.extend(block.repeat(count));
         let texture = decode_texture(Path::new(name), &bytes).unwrap();
         assert_eq!((texture.format, texture.transfer, texture.levels.len()), (format, transfer, 2), "{name}");
@@ -397,7 +420,8 @@ fn dds_files_of_old_writers_are_read() {
     for (pixels, word) in [
         (four(b"DXT5"), "\"DXT5\""),
         (four(&[116, 0, 0, 0]), "116"),
-        ((0x40, b"\0\0\0\0", 24, bgra), "24 bits"),
+        (plain(0x41, 24, [0xff_0000, 0xff00, 0xff, 0xff00_0000]), "24 bits"),
+        (plain(0x40, 16, [0xf800, 0x7e0, 0x1f, 0]), "16 bits"),
         (masked(0x40, [0x3ff, 0xf_fc00, 0x3ff0_0000, 0]), "32 bits"),
     ] {
         let error = decode_texture(Path::new("x.dds"), &old_dds(pixels, 4, 4, 1)).unwrap_err().to_string();

@@ -324,6 +324,7 @@ pub(crate) fn fetch(
                 path: name.to_path_buf(),
                 what: what.into(),
                 file: path.into_owned(),
+                others: Vec::new(),
                 source,
             }),
             Err(Refusal::Outside { folder }) => Err(Error::Outside {

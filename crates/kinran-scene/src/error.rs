@@ -28,7 +28,10 @@ pub enum Error {
         reason: String,
     },
     /// A file that a document names is not there, or the operating system refused to read it.
-    #[error("{}: {what}: the file \"{file}\" it names cannot be read: {}", path.display(), kinran_image::io_reason(source))]
+    #[error(
+        "{}: {what}: the file \"{file}\" it names cannot be read: {}{}",
+        path.display(), kinran_image::io_reason(source), also(others)
+    )]
     Unreadable {
         /// The document.
         path: PathBuf,
@@ -36,6 +39,8 @@ pub enum Error {
         what: String,
         /// The path that stands there.
         file: String,
+        /// Other files that it names and that cannot be read.
+        others: Vec<String>,
         /// What the operating system said.
         source: std::io::Error,
     },
@@ -61,6 +66,27 @@ pub enum Error {
     /// A [`Tick`](kinran_image::Tick) stopped the work.
     #[error(transparent)]
     Cancelled(#[from] kinran_image::Cancelled),
+}
+
+/// Files that a sentence names.
+const NAMED: usize = 4;
+
+/// What of several files that cannot be read stands behind the first, and what to do.
+fn also(others: &[String]) -> String {
+    let named: Vec<String> = others.iter().take(NAMED).map(|file| format!("\"{file}\"")).collect();
+    let more = match others.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    match named.len() {
+        0 => "; put it beside the model, or export the model again".into(),
+        _ => {
+            format!(
+                ", nor can {}{more}; put them beside the model, or export the model again",
+                named.join(", ")
+            )
+        }
+    }
 }
 
 impl Error {

@@ -119,11 +119,19 @@ pub struct Needs {
     pub maps: Maps,
     /// Images that say what surfaces reflect are read too ([`Material::reflecting`]); where that fails, it is a warning.
     pub reflectance: bool,
+    /// An image that is missing or damaged is a warning, and left out: to look at a model as it is. Files that a model may not
+    /// name are refused all the same.
+    pub forgiving: bool,
 }
 
 impl Needs {
+    /// Nothing but materials.
+    pub const NONE: Needs =
+        Needs { geometry: false, rest_pose: false, maps: Maps::None, reflectance: false, forgiving: false };
+
     /// All there is.
-    pub const ALL: Needs = Needs { geometry: true, rest_pose: true, maps: Maps::All, reflectance: true };
+    pub const ALL: Needs =
+        Needs { geometry: true, rest_pose: true, maps: Maps::All, reflectance: true, forgiving: false };
 }
 
 impl Scene {
@@ -303,7 +311,9 @@ fn load_buffers(
                 let (claimed, got) = (buffer.byte_length, bytes.len());
                 return Err(Error::malformed(
                     name,
-                    format!("{what} claims {claimed} bytes and there are {got}: it is truncated"),
+                    format!(
+                        "{what} claims {claimed} bytes and there are {got}: it is truncated, export it again"
+                    ),
                 ));
             }
             Ok(bytes)
@@ -1407,28 +1417,44 @@ impl Loader<'_> {
     fn images(&mut self, resolve: &Resolver<'_>) -> Result<(), Error> {
         let (drawn, runtime) = self.needed_images();
         let texels = AtomicU64::new(0);
-        let images: Result<Vec<_>, Error> = (drawn.par_iter().enumerate())
+        let images: Vec<Result<_, Error>> = (drawn.par_iter().enumerate())
             .map(|(i, &used)| {
                 if used == Drawn::Not {
-                    return Ok(Ok(None));
+                    return Ok(None);
                 }
                 let image = self.image(i, &texels, resolve);
                 (self.tick)(IMAGE)?;
-                match image {
-                    Ok(image) => Ok(Ok(Some(Arc::new(image)))),
-                    Err(error) if used == Drawn::Wished && !matches!(error, Error::Cancelled(_)) => {
-                        Ok(Err(error))
-                    }
-                    Err(error) => Err(error),
-                }
+                image.map(|image| Some(Arc::new(image)))
             })
             .collect();
-        for image in images? {
-            let image = image.unwrap_or_else(|error| {
-                self.warn(format!("{error}; what it reflects is not known"));
-                None
-            });
+        let mut fault: Option<Error> = None;
+        for (image, used) in images.into_iter().zip(&drawn) {
+            let image = match image {
+                Ok(image) => image,
+                Err(Error::Cancelled(cancelled)) => return Err(cancelled.into()),
+                Err(error) => {
+                    if *used == Drawn::Wished {
+                        self.warn(format!("{error}; what it reflects is not known"));
+                    } else if self.needs.forgiving
+                        && matches!(error, Error::Unreadable { .. } | Error::Image(_))
+                    {
+                        self.warn(error.to_string());
+                    } else {
+                        match (&mut fault, error) {
+                            (Some(Error::Unreadable { others, .. }), Error::Unreadable { file, .. }) => {
+                                others.push(file);
+                            }
+                            (Some(_), _) => {}
+                            (fault, error) => *fault = Some(error),
+                        }
+                    }
+                    None
+                }
+            };
             self.scene.images.push(image);
+        }
+        if let Some(fault) = fault {
+            return Err(fault);
         }
         let textures = (runtime.into_par_iter().enumerate())
             .map(|(i, used)| {
@@ -1448,6 +1474,8 @@ impl Loader<'_> {
                     self.warn(format!("{error}; the PNG or JPEG beside it is taken"));
                     None
                 }
+                // It was told of the image already.
+                Err(_) if self.needs.forgiving => None,
                 Err(error) => return Err(error),
             };
             self.scene.textures.push(texture);

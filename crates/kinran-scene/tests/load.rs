@@ -689,7 +689,7 @@ fn a_damaged_part_stops_a_task_that_does_not_need_it() {
     let path = folder.path().join("a.glb");
     std::fs::write(&path, glb(&json, &bin)).unwrap();
     let needs = |geometry, maps| {
-        Scene::load_part(&path, &[], &Needs { geometry, rest_pose: true, maps, reflectance: false })
+        Scene::load_part(&path, &[], &Needs { geometry, rest_pose: true, maps, ..Needs::NONE })
     };
     let scene = needs(false, Maps::Surface).unwrap();
     assert!(scene.images[0].is_some(), "the normal map");
@@ -742,8 +742,7 @@ fn compressed_geometry_is_read_as_other_geometry() {
         let path = folder.path().join("noise.glb");
         std::fs::write(&path, empty).unwrap();
         assert!(Scene::load(&path).is_err(), "{name}: noise was geometry");
-        let needs =
-            Needs { geometry: false, rest_pose: true, maps: kinran_scene::Maps::Surface, reflectance: false };
+        let needs = Needs { rest_pose: true, maps: kinran_scene::Maps::Surface, ..Needs::NONE };
         assert!(Scene::load_part(&path, &[], &needs).is_ok(), "{name}: textures need geometry");
     }
 }

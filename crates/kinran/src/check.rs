@@ -26,7 +26,17 @@ pub struct Finding {
     pub problem: String,
 }
 
-/// What a file breaks of the rules for what Kinran writes; nothing where all is well.
+/// What was looked at in a file, and what of it breaks the rules.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Checked {
+    /// How many of the things that have rules are in it: textures with mips, extensions of Kinran's, meshes with curvature,
+    /// files that a report names. A model that was never baked has none.
+    pub looked_at: usize,
+    /// What is wrong; nothing where all is well.
+    pub findings: Vec<Finding>,
+}
+
+/// What a file breaks of the rules for what Kinran writes.
 ///
 /// - `.ktx2`, `.dds`: levels down to 1×1, of skin tables one; what it holds is said by a known key and its format has the
 ///   channels for it; colour is sRGB and all else linear; no half float is infinite or none; normals are no longer than one.
@@ -38,10 +48,10 @@ pub struct Finding {
 ///
 /// # Errors
 /// [`Error::Image`] where the file cannot be read, or is none of these. What is damaged is a finding.
-pub fn check(files: &dyn Files, path: &Path) -> Result<Vec<Finding>, Error> {
+pub fn check(files: &dyn Files, path: &Path) -> Result<Checked, Error> {
     let is = |extension: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
     let bytes = files.read(path).map_err(|e| kinran_image::Error::io(path, e))?;
-    let mut findings = Findings::default();
+    let mut findings = Findings(Checked { looked_at: 0, findings: Vec::new() });
     if is("ktx2") || is("dds") {
         findings.texture_file(&name_of(path), path, &bytes, None);
     } else if is_gltf(path) {
@@ -59,12 +69,11 @@ pub fn check(files: &dyn Files, path: &Path) -> Result<Vec<Finding>, Error> {
 /// chosen by eye: BC5 of sharp maps ends at 1.04.
 const LONG: f32 = 1.1;
 
-#[derive(Default)]
-struct Findings(Vec<Finding>);
+struct Findings(Checked);
 
 impl Findings {
     fn add(&mut self, place: &str, problem: impl Into<String>) {
-        self.0.push(Finding { place: place.into(), problem: problem.into() });
+        self.0.findings.push(Finding { place: place.into(), problem: problem.into() });
     }
 
     /// A texture's file; `slot` says what it should hold where a model uses it. Gives its texture where it can be read.
@@ -75,6 +84,7 @@ impl Findings {
         bytes: &[u8],
         slot: Option<&[Content]>,
     ) -> Option<Texture> {
+        self.0.looked_at += 1;
         match decode_texture(path, bytes) {
             Ok(texture) => {
                 let is_dds = bytes.starts_with(b"DDS ");
@@ -239,6 +249,7 @@ impl Findings {
         walk(&Value::Object(json.clone()), &mut found);
         found.sort();
         found.dedup();
+        self.0.looked_at += found.iter().filter(|extension| extension.starts_with("KINRAN_")).count();
         let used = listed("extensionsUsed");
         for extension in found.iter().filter(|extension| !used.contains(&extension.as_str())) {
             self.add(name, format!("{extension} is used, and not listed in extensionsUsed"));
@@ -331,6 +342,7 @@ impl Findings {
             Err(error) => return self.add(&name, format!("names no files that were written: {error}")),
         };
         for file in known.files() {
+            self.0.looked_at += 1;
             if relative(&file.file).is_none() {
                 self.add(&name, format!("\"{}\" leads out of its folder", file.file));
                 continue;

@@ -46,7 +46,7 @@ mod skin_profile;
 mod task;
 mod textures;
 
-pub use check::{Finding, check};
+pub use check::{Checked, Finding, check};
 pub use error::{Error, InputFault};
 pub use kinran_image::{Disk, Entry, Files, Memory};
 pub use sink::{OutputFolder, Sink, Space};

@@ -7,7 +7,7 @@ use std::path::Path;
 use common::{maps, model};
 use kinran::bake::{FolderOptions, GltfOptions, Which, folder, gltf, understand};
 use kinran::options::{Container, Form};
-use kinran::{Files, Finding, Memory, Task, check};
+use kinran::{Checked, Files, Finding, Memory, Task, check};
 use kinran_image::{
     Channels, Encoder, Image, Pixels, Texture, Transfer, decode_ktx2, encode_ktx2, encode_png,
 };
@@ -71,7 +71,9 @@ fn what_was_just_baked_is_found_wrong() {
         for (name, _) in files.files() {
             let end = name.extension().unwrap().to_str().unwrap();
             if ["ktx2", "dds", "gltf", "json"].contains(&end) {
-                assert_eq!(check(&files, &name).unwrap(), [], "{}", name.display());
+                let Checked { looked_at, findings } = check(&files, &name).unwrap();
+                assert_eq!(findings, [], "{}", name.display());
+                assert!(looked_at > 0, "{}: nothing in it has rules", name.display());
                 checked += 1;
             }
         }
@@ -88,7 +90,7 @@ fn a_texture_that_breaks_a_rule_is_all_right() {
             change(&mut texture);
             encode_ktx2(&texture, None).unwrap()
         });
-        only(check(&files, name.as_ref()).unwrap())
+        only(check(&files, name.as_ref()).unwrap().findings)
     };
     let normal = "silk_normal.ktx2";
     let said = broken(normal, &|texture| drop(texture.levels.pop()));
@@ -111,7 +113,7 @@ fn a_texture_that_breaks_a_rule_is_all_right() {
     });
     assert_eq!(said, "silk_normal.ktx2, level 2: 32 of 32 normals are longer than one");
     let cut = changed(&files, normal, |bytes| bytes[..bytes.len() / 2].to_vec());
-    let said = only(check(&cut, normal.as_ref()).unwrap());
+    let said = only(check(&cut, normal.as_ref()).unwrap().findings);
     assert!(said.starts_with("silk_normal.ktx2: ") && said.matches(".ktx2").count() == 1, "{said}");
 }
 
@@ -125,7 +127,7 @@ fn a_model_that_breaks_a_rule_is_all_right() {
             assert!(text.contains(from), "{from} is not in {text}");
             text.replacen(from, to, 1).into_bytes()
         });
-        check(&files, name.as_ref()).unwrap()
+        check(&files, name.as_ref()).unwrap().findings
     };
     let said = only(broken("\"KHR_texture_basisu\",", ""));
     assert_eq!(said, "drum.gltf: KHR_texture_basisu is used, and not listed in extensionsUsed");
@@ -158,22 +160,22 @@ fn a_report_speaks_of_files_that_are_others_now() {
         bytes.push(0);
         bytes
     });
-    let said = check(&longer, name.as_ref()).unwrap();
+    let said = check(&longer, name.as_ref()).unwrap().findings;
     assert!(said.iter().any(|f| f.place == texture && f.problem.starts_with("was changed")), "{said:#?}");
     let gone: Memory = files.files().into_iter().filter(|(name, _)| name != Path::new(texture)).collect();
-    let said = only(check(&gone, name.as_ref()).unwrap());
+    let said = only(check(&gone, name.as_ref()).unwrap().findings);
     assert_eq!(said, "silk_normal.ktx2: there is no such file or folder");
     let lies = changed(&files, name, |bytes| {
         String::from_utf8(bytes).unwrap().replacen("\"levels\": 6", "\"levels\": 7", 1).into_bytes()
     });
-    assert!(only(check(&lies, name.as_ref()).unwrap()).contains("levels: it has 6"));
+    assert!(only(check(&lies, name.as_ref()).unwrap().findings).contains("levels: it has 6"));
     let written = r#"{ "written": [{ "file": "../secret", "bytes": 1, "blake3": "" }] }"#;
     let outside = Memory::from([("a/x.kinran.json", written.as_bytes()), ("secret", b"s")]);
-    let said = only(check(&outside, "a/x.kinran.json".as_ref()).unwrap());
+    let said = only(check(&outside, "a/x.kinran.json".as_ref()).unwrap().findings);
     assert_eq!(said, "x.kinran.json: \"../secret\" leads out of its folder");
     let files = changed(&files, texture, |bytes| bytes);
     files.insert("silk_normal.dds", files.get(texture).unwrap());
-    let said = only(check(&files, "silk_normal.dds".as_ref()).unwrap());
+    let said = only(check(&files, "silk_normal.dds".as_ref()).unwrap().findings);
     assert_eq!(said, "silk_normal.dds: holds KTX2; its name must end in .ktx2");
     let dump = Memory::from([("boot_curvature.json", b"{}".to_vec())]);
     assert!(check(&dump, "boot_curvature.json".as_ref()).is_err());

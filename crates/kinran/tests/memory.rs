@@ -106,7 +106,7 @@ fn tables_of_skin_break_the_rules_for_tables() {
     let (names, _) = how.plan();
     assert_eq!(made.written.iter().map(|w| w.file.clone()).collect::<Vec<_>>(), names);
     for name in names.iter().map(String::as_str).chain(["skin.kinran.json"]) {
-        assert_eq!(check(&out, name.as_ref()).unwrap(), [], "{name}");
+        assert_eq!(check(&out, name.as_ref()).unwrap().findings, [], "{name}");
     }
     how.profile = ProfileSource::Given(Profile::Burley([0.0; 3]), "none".into());
     let none = tables(&Memory::new(), &how, None, &Memory::new(), Task::QUIET);

@@ -191,7 +191,8 @@ pub(crate) fn check_layers(layers: &[Layer], kind: MapKind) -> Result<(), Error>
     for (i, layer) in layers.iter().enumerate() {
         let name = format!("layer {}", i + 1);
         if layer.tile.kind != kind {
-            return fail(format!("{name} holds {:?}, but the target is {kind:?}", layer.tile.kind));
+            let [tile, target] = [layer.tile.kind, kind].map(MapKind::name);
+            return fail(format!("{name} holds {tile}, but the target is {target}"));
         }
         let LayerTransform { scale, rotation, offset, .. } = layer.transform;
         if !(scale.is_finite()

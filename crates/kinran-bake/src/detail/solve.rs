@@ -132,8 +132,9 @@ impl Target {
         }
         let alpha = if self.alpha { " with alpha" } else { "" };
         Err(Error::Unsupported(format!(
-            "{format:?} does not hold a map of kind {:?}{alpha}; take BC7 or RGBA8",
-            self.kind
+            "{} does not hold a map of {}{alpha}; take bc7 or rgba8",
+            format.name(),
+            self.kind.name()
         )))
     }
 }

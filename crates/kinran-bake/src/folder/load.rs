@@ -15,8 +15,8 @@ use super::evidence::{
     not_normals, odd_lengths, outside_unit,
 };
 use super::{
-    BaseRoughness, DirectionSource, FolderError, Green, GreenGuess, GreenSource, LevelSource, MapChannel,
-    MaterialMaps, NormalSource, Role, RoughnessSource,
+    BaseRoughness, CUT_OUT, DirectionSource, FolderError, Green, GreenGuess, GreenSource, LevelSource,
+    MapChannel, MaterialMaps, NormalSource, Role, RoughnessSource,
 };
 use crate::aniso::{
     ColorMap, Dielectric, DirectionMap, NormalMap, NormalZ, Reflectance, ReflectanceMaps, RoughnessMaps,
@@ -126,7 +126,7 @@ impl MaterialMaps {
         // Of several errors the first file's, whichever was read first.
         let images: Images = read.into_iter().collect::<Result<_, FolderError>>()?;
         drop(known);
-        let loaded: Vec<LoadedMap> =
+        let mut loaded: Vec<LoadedMap> =
             (self.files.iter()).map(|(role, path)| self.loaded(*role, path, &images[path])).collect();
         let place = |map: &MapChannel| Some((loaded.iter().position(|l| l.path == map.file)?, map.channel));
         let (occlusion, metallic) =
@@ -140,12 +140,27 @@ impl MaterialMaps {
         let surface = match &self.roughness {
             None => None,
             Some(source) => {
+                let mut remarks = Vec::new();
                 let normal = match &self.normal {
-                    Some(source) => normal_map(source, &images[&source.file].image, &mut notes)?,
+                    Some(source) => {
+                        normal_map(source, &images[&source.file].image, &mut notes, &mut remarks)?
+                    }
                     None => NormalMap::flat(),
                 };
                 let roughness = roughness_maps(source, &images, self.wrap)?;
-                Some(SurfaceMaps { normal, roughness, wrap: self.wrap, weights: None })
+                let maps = SurfaceMaps { normal, roughness, wrap: self.wrap, weights: None };
+                let size = maps.size();
+                for map in loaded.iter_mut().filter(|map| is_of_surface(map.role)) {
+                    if map.role == Role::Normal {
+                        map.remarks.append(&mut remarks);
+                    }
+                    let own = (map.image.width, map.image.height);
+                    if own != size {
+                        let [from, to] = [own, size].map(|(width, height)| format!("{width}x{height}"));
+                        map.remarks.push(format!("{from}, enlarged to {to}, the size of the largest"));
+                    }
+                }
+                Some(maps)
             }
         };
         Ok(LoadedMaterial { name: self.name.clone(), surface, images: loaded, occlusion, metallic, notes })
@@ -285,6 +300,9 @@ impl MaterialMaps {
             || [Role::Gloss, Role::Roughness]
                 .iter()
                 .any(|quantity| role.packed_channel(*quantity) == Some(3));
+        if role == Role::Color && has_alpha(&image) {
+            remarks.push(CUT_OUT.into());
+        }
         if !reads_alpha && has_alpha(&image) {
             remarks.push("its alpha is not 1 everywhere and is not read".into());
         }
@@ -296,21 +314,45 @@ fn unfit(path: &Path, reason: impl Into<String>, fix: impl Into<String>) -> Fold
     FolderError::Unfit { path: path.into(), reason: reason.into(), fix: fix.into() }
 }
 
-/// A normal map, after a look at its texels.
+/// Whether maps of a role are brought to one size and filtered together.
+fn is_of_surface(role: Role) -> bool {
+    use Role::{
+        Anisotropy, AnisotropyLevel, Direction, DirectionAngle, Gloss, GlossU, GlossV, Normal, Roughness,
+    };
+    matches!(
+        role,
+        Normal
+            | Roughness
+            | Gloss
+            | GlossU
+            | GlossV
+            | Direction
+            | DirectionAngle
+            | Anisotropy
+            | AnisotropyLevel
+    )
+}
+
+/// A normal map, after a look at its texels; `remarks` are about it, `notes` what may be wrong with it.
 fn normal_map(
     source: &NormalSource,
     image: &Arc<Image>,
     notes: &mut Vec<String>,
+    remarks: &mut Vec<String>,
 ) -> Result<NormalMap, FolderError> {
     let file = &source.file;
-    if !source.force
-        && let Some(reason) = not_normals(image)
-    {
-        return Err(unfit(
-            file,
-            format!("this is not a tangent-space normal map: {reason}"),
-            "name the right file with --map normal=FILE, or say --force-normal if it is one nevertheless",
-        ));
+    match not_normals(image) {
+        Some(reason) if source.force => {
+            remarks.push(format!("a normal map by --force-normal, though {reason}"))
+        }
+        Some(reason) => {
+            return Err(unfit(
+                file,
+                format!("this is not a tangent-space normal map: {reason}"),
+                "name the right file with --map normal=FILE, or say --force-normal if it is one nevertheless",
+            ));
+        }
+        None => {}
     }
 
     let correlation = green_correlation(image);
@@ -341,6 +383,7 @@ fn normal_map(
         (false, GreenSource::Assumed) if guess == GreenGuess::Unsure => {
             notes.push(format!("{name}: assumed +Y; its slopes do not tell, say --y-down if it is DirectX"));
         }
+        (false, GreenSource::Assumed) => remarks.push("its slopes agree".into()),
         // Texels have the last word where they are asked.
         (_, GreenSource::Texels) | (false, _) => {}
     }

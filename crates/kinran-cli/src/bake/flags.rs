@@ -6,7 +6,7 @@ use kinran_bake::aniso::Kernel;
 use kinran_bake::curvature::Method;
 use kinran_scene::Wrap;
 
-use super::Args;
+use super::{Args, DEFAULT_ZSTD};
 
 /// What a flag acts on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ pub(super) const FLAGS: [Flag; 43] = [
     flag("edges", On::Folder, |a| a.edges != Wrap::Repeat),
     flag("form", On::Any, |a| a.form.is_some()),
     flag("container", On::Any, |a| a.container != Container::default()),
-    flag("zstd", On::Any, |a| a.zstd != 3),
+    flag("zstd", On::Any, |a| a.zstd != DEFAULT_ZSTD),
     flag("normal-format", On::Any, |a| a.normal_format.is_some()),
     flag("aniso-format", On::Any, |a| a.aniso_format.is_some()),
     flag("color-format", On::Any, |a| a.color_format.is_some()),

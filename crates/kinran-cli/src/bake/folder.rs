@@ -3,7 +3,7 @@
 use kinran::options::AlphaCoverage;
 use kinran::report::{Report, SurfaceReport};
 use kinran::{Disk, Sink, bake};
-use kinran_bake::folder::{Folder, Role as MapRole, Row};
+use kinran_bake::folder::{CUT_OUT, Folder, Role as MapRole, Row};
 
 use super::Args;
 use super::report::{BakeReport, text};
@@ -14,17 +14,17 @@ use crate::{Console, Error};
 /// Bakes a folder and tells what came of it.
 pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let mut folder = understand(args)?;
-    let idle = idle(args, &folder.rows);
     let mut reports = bake_folder(args, &folder, console)?;
-    if let Some(first) = reports.first_mut() {
-        first.warnings.extend(idle);
-    }
-    reports.iter().flat_map(|report| &report.warnings).for_each(|warning| console.warn(warning));
     for surface in reports.iter().flat_map(|report| &report.surfaces) {
         for input in &surface.inputs {
             add_remarks(&mut folder.rows, &surface.name, &input.file, &input.notes);
         }
     }
+    let idle = idle(args, &folder.rows);
+    if let Some(first) = reports.first_mut() {
+        first.warnings.extend(idle);
+    }
+    reports.iter().flat_map(|report| &report.warnings).for_each(|warning| console.warn(warning));
     let files: String = reports.iter().map(|report| text(report, args.output())).collect();
     let text = format!("{}\n{files}", folder.table());
     console.result(&BakeReport::new(args, folder.rows, reports), &text)
@@ -58,6 +58,11 @@ fn idle(args: &Args, rows: &[Row]) -> Vec<String> {
         ("normal-blue", args.normal_blue && !has(&[Normal]), missing("normal")),
         ("force-normal", args.force_normal && !has(&[Normal]), missing("normal")),
         (
+            "force-normal",
+            args.force_normal && has(&[Normal]) && !has_note("by --force-normal"),
+            "every normal map looks like one".into(),
+        ),
+        (
             "direction-span",
             args.direction_span.is_some() && !has(&[Direction, DirectionAngle]),
             missing("direction"),
@@ -75,6 +80,11 @@ fn idle(args: &Args, rows: &[Row]) -> Vec<String> {
         ("color-space", args.color_space.is_some() && !has(&[Color]), missing("colour")),
         ("color-format", args.color_format.is_some() && !has(&[Color]), missing("colour")),
         ("alpha-coverage", args.alpha_coverage != AlphaCoverage::Masked && !has(&[Color]), missing("colour")),
+        (
+            "alpha-coverage",
+            args.alpha_coverage != AlphaCoverage::Masked && has(&[Color]) && !has_note(CUT_OUT),
+            "every colour map is opaque".into(),
+        ),
     ];
     let given = flags.into_iter().filter(|(_, is_idle, _)| *is_idle);
     given.map(|(flag, _, why)| format!("--{flag} has nothing to act on: {why}")).collect()

@@ -5,10 +5,10 @@ mod watch;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use kinran::Space;
 use kinran::library::{
     BakeOptions, Job, Key, Kind, Library, Manifest, ManifestError, Plan, Status, StoredFile,
 };
+use kinran::{Space, Task};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -160,12 +160,24 @@ pub fn bake_library(args: &Args, console: &Console) -> Result<(), Error> {
     if args.library.watch {
         return watch::watch(args, console);
     }
-    let built = build(args, console, &mut Failures::new())?;
+    let bars = Bars::new(console.progress());
+    let built = build(args, bars.task(), &mut Failures::new())?;
+    drop(bars);
     built.tell(console, true)?;
     match built.report.count(Status::Failed) {
         0 => Ok(()),
         failed => Err(Error::Entries { failed, of: built.report.entries.len(), done: !args.dry_run }),
     }
+}
+
+/// Bakes what a manifest lists and gives the report, for programs that print nothing; `words` are flags of `kinran bake` that
+/// say what a run does, such as `--dry-run`.
+///
+/// # Errors
+/// Those of [`bake_library`], but for entries that failed, which the report tells.
+pub fn library_report(manifest: &Path, words: &[String], task: Task<'_>) -> Result<LibraryReport, Error> {
+    let args = settings::args_of_run(manifest, words)?;
+    Ok(build(&args, task, &mut Failures::new())?.report)
 }
 
 /// Entries that cannot be baked as they are now, by folder: their keys, where they have one, and why.
@@ -201,7 +213,7 @@ impl Built {
     }
 }
 
-fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Built, Error> {
+fn build(args: &Args, task: Task<'_>, failures: &mut Failures) -> Result<Built, Error> {
     let manifest = Manifest::read(&args.input)?;
     let output = args.output.clone().unwrap_or_else(|| manifest.output.clone());
     if !args.dry_run {
@@ -222,10 +234,9 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
         });
     }
 
-    let bars = Bars::new(console.progress());
     let is_known =
         |folder: &Path, key: &Key| matches!(failures.get(folder), Some((Some(known), _)) if known == key);
-    let looked = library.look(plans, &is_known, bars.task())?;
+    let looked = library.look(plans, &is_known, task)?;
     let mut tight = None;
     let done = if args.dry_run {
         looked.planned(args.library.prune)
@@ -235,7 +246,7 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
         (how.jobs, how.prune) = (args.library.jobs.map(usize::from), args.library.prune);
         how.cache_limit = manifest.cache_limit;
         how.plot = Some(&skin_lut::draw);
-        looked.bake(&how, bars.task())?
+        looked.bake(&how, task)?
     };
 
     // Tell what went wrong once.
@@ -258,7 +269,11 @@ fn build(args: &Args, console: &Console, failures: &mut Failures) -> Result<Buil
         if let Some(error) = &error {
             let is_news = known.as_ref().is_none_or(|(_, why)| why.message != error.message);
             if is_news || args.dry_run {
-                failed.push(format!("{}: {}", entry.name, error.message));
+                // What is wrong in the manifest names its place itself.
+                failed.push(match entry.kind {
+                    Some(_) => format!("{}: {}", entry.name, error.message),
+                    None => error.message.clone(),
+                });
             }
             // Without a key it is looked at again and again, until it has one.
             let key = entry.key.or(known.and_then(|(key, _)| key));

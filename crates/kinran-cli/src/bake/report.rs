@@ -18,20 +18,37 @@ pub(super) fn text(report: &Report, folder: &Path) -> String {
     let width = files().map(|o| o.file.chars().count()).max().unwrap_or(0);
     for o in files() {
         text += &format!(
-            "{:width$}  {:7} {:6} {:>11}  {:2} levels  {:>9.1} KiB\n",
+            "{:width$}  {:7} {:6} {:>11}  {:>9}  {:>9.1} KiB\n",
             o.file,
             o.format,
             o.transfer,
             format!("{}x{}", o.width, o.height),
-            o.levels,
+            counted(o.levels, "level", "levels"),
             o.bytes as f64 / 1024.0,
         );
     }
     text.extend(report.curvature.iter().map(curvature::text));
+    let others: Vec<&str> = (report.written.iter().map(|file| file.file.as_str()))
+        .filter(|file| files().all(|output| output.file != *file))
+        .collect();
+    text += &beside(&others);
     let bytes: u64 = report.written.iter().map(|file| file.bytes as u64).sum();
     let files = counted(report.written.len(), "file", "files");
     text += &format!("{files}, {:.1} KiB, in {}\n", bytes as f64 / 1024.0, folder.display());
     text + &kept_remark(&report.kept)
+}
+
+/// Files that a line names.
+const NAMED: usize = 6;
+
+/// A line on files without mips: what other viewers show, the model, the report.
+fn beside(files: &[&str]) -> String {
+    let named = files[..files.len().min(NAMED)].join(", ");
+    match files.len() {
+        0 => String::new(),
+        count if count > NAMED => format!("and {named} and {} more\n", count - NAMED),
+        _ => format!("and {named}\n"),
+    }
 }
 
 /// What `kinran bake` made of a folder or a model, or with `--dry-run` would make.

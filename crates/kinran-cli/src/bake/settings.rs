@@ -1,11 +1,12 @@
 //! Flags of `kinran bake`, `kinran detail solve` and `kinran skin-lut` as a manifest gives them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use clap::error::ContextKind;
 use clap::{ArgAction, CommandFactory, Parser};
 use kinran::detail::SolveOptions;
 use kinran::library::JobOptions;
-use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError, Setting, SettingValue};
+use kinran_bake::manifest::{Job, Kind, Manifest, ManifestError, Setting, SettingValue, nearest};
 
 use super::Args;
 use super::flags::Flag;
@@ -46,6 +47,24 @@ pub(super) fn refuse_others(args: &Args) -> Result<(), Error> {
             Err(Error::flag_error_of(&args.input, format!("--{}", flag.name), reason))
         }
     }
+}
+
+/// What words say of a run over a manifest.
+///
+/// # Errors
+/// [`Error::Flag`] for a flag that is not there, a value that is none, and a flag that says how entries are baked.
+pub(super) fn args_of_run(manifest: &Path, words: &[String]) -> Result<Args, Error> {
+    let first = [manifest.to_string_lossy().into_owned()];
+    let args =
+        BakeFlags::try_parse_from(first.iter().chain(words)).map_err(|e| flag_error(manifest, &e))?.args;
+    refuse_others(&args).map(|()| args)
+}
+
+/// A word that is no flag, or no value of one.
+fn flag_error(input: &Path, error: &clap::Error) -> Error {
+    let about = error.get(ContextKind::InvalidArg).map(ToString::to_string);
+    let flag = about.and_then(|flag| flag.split_whitespace().next().map(str::to_owned));
+    Error::Flag { flag: flag.unwrap_or_default(), file: Some(input.into()), message: reason(error) }
 }
 
 /// Whether a flag says what a run does, not how an entry is baked.
@@ -91,7 +110,7 @@ pub(super) fn options(manifest: &Manifest, job: &Job) -> Result<JobOptions, Mani
         return Ok(JobOptions::Skin(args.options()));
     }
     let mut args = BakeFlags::try_parse_from(all).map_err(wrong)?.args;
-    (args.textures().check()).map_err(|e| manifest.error(&job.place, Error::from(e).to_string()))?;
+    args.check_textures().map_err(|e| manifest.error(&job.place, e.to_string()))?;
     args.model.allow_outside.iter_mut().for_each(|folder| *folder = manifest.beside(&*folder));
     let maps = args.map.iter_mut().map(|(_, path)| path);
     let layers = args.exr_layer.iter_mut().map(|(path, _)| path);
@@ -109,6 +128,41 @@ pub(super) fn options(manifest: &Manifest, job: &Job) -> Result<JobOptions, Mani
     let mut how = args.folder_options();
     how.source = None;
     Ok(JobOptions::Folder(how))
+}
+
+/// How an input is baked, by the words of its flags as the command line has them (`--zstd=9`, `--all-textures`): those of
+/// `kinran bake` for folders and models, of `kinran detail solve` for targets, and of `kinran skin-lut`, whose input is among
+/// them.
+///
+/// # Errors
+/// [`Error::Flag`] for a flag that is not there, a value that is none, and a flag that cannot act on the input.
+pub fn options_of(kind: Kind, input: &Path, words: &[String]) -> Result<JobOptions, Error> {
+    let wrong = |error: clap::Error| flag_error(input, &error);
+    let first = [input.to_string_lossy().into_owned()];
+    let bake = |first: &[String]| -> Vec<String> { first.iter().chain(words).cloned().collect() };
+    match kind {
+        Kind::Aniso | Kind::Mesh => {
+            let args = BakeFlags::try_parse_from(bake(&first)).map_err(wrong)?.args;
+            args.check_textures()?;
+            if let Some(flag) = args.idle_flag(kind == Kind::Mesh) {
+                let why = format!("{}; leave it out", flag.refusal());
+                return Err(Error::flag_error_of(input, format!("--{}", flag.name), why));
+            }
+            Ok(match kind {
+                Kind::Mesh => JobOptions::Model(args.gltf_options()),
+                _ => JobOptions::Folder(args.folder_options()),
+            })
+        }
+        Kind::Detail => {
+            let args = DetailFlags::try_parse_from(bake(&first)).map_err(wrong)?.args;
+            Ok(JobOptions::Detail(args.options()))
+        }
+        Kind::Skin => {
+            let output = ["--output=output".to_owned()];
+            let args = SkinFlags::try_parse_from(bake(&output)).map_err(wrong)?.args;
+            Ok(JobOptions::Skin(args.options()))
+        }
+    }
 }
 
 fn command(kind: Kind) -> clap::Command {
@@ -219,7 +273,9 @@ fn unknown(command: &clap::Command, name: &str) -> String {
         return format!("`{name}` says what a run does; give it on the command line as --{plain}");
     }
     names.sort_unstable();
-    format!("unknown key `{name}`; expected input, exclude, output, or a flag: {}", names.join(", "))
+    let known = ["input", "exclude", "output"].into_iter().chain(names.iter().copied());
+    let meant = nearest(name, known).map_or_else(String::new, |meant| format!("did you mean `{meant}`? "));
+    format!("unknown key `{name}`; {meant}expected input, exclude, output, or a flag: {}", names.join(", "))
 }
 
 /// Begins the keys in a message.
@@ -273,7 +329,7 @@ pub(super) fn with_keys(kind: Kind, message: &str) -> String {
     });
     match keys.as_slice() {
         [] => message.to_owned(),
-        keys => format!("{message} {IN_THE_MANIFEST}{})", keys.join(", ")),
+        keys => format!("{message} {IN_THE_MANIFEST}{})", keys.join(" or ")),
     }
 }
 

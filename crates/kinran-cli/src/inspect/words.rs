@@ -1,7 +1,7 @@
 //! What was found in a file, for people.
 
 use kinran::inspect::{
-    ImageReport, LENGTH_TOLERANCE, MapReport, ModelReport, NamedFile, Range, RuntimeReport, State,
+    Factors, ImageReport, LENGTH_TOLERANCE, MapReport, ModelReport, NamedFile, Range, RuntimeReport, State,
     Statistics, TextureReport, WrittenReport,
 };
 
@@ -149,7 +149,15 @@ pub(super) fn model(report: &ModelReport) -> String {
 
     let mut text = format!("{}\n{}", list(&facts), list(&primitives));
     for m in &report.materials {
-        let mut rows = vec![row("  bake", m.bake.clone())];
+        let mut rows = vec![row("  bake", m.bake.clone()), row("  factors", factors(&m.factors))];
+        let sides = if m.double_sided { ", double-sided" } else { "" };
+        match (m.alpha, m.alpha_cutoff) {
+            (alpha, Some(cutoff)) => {
+                rows.push(row("  alpha", format!("{alpha} below {}{sides}", short(cutoff))))
+            }
+            ("opaque", None) if !m.double_sided => {}
+            (alpha, None) => rows.push(row("  alpha", format!("{alpha}{sides}"))),
+        }
         rows.extend(m.maps.iter().map(|map| {
             let MapReport { slot, width, height, channels, bits, uv_set, runtime } = map;
             let levels = runtime.as_ref().map_or_else(String::new, mips);
@@ -162,6 +170,30 @@ pub(super) fn model(report: &ModelReport) -> String {
         text += &format!("\nmaterial {}\n{}", m.name, list(&rows));
     }
     text
+}
+
+/// Factors in words; those of normals and emission where they say something.
+fn factors(factors: &Factors) -> String {
+    let list = |values: &[f32]| values.iter().copied().map(short).collect::<Vec<_>>().join(" ");
+    let mut text = format!(
+        "base colour {}, metalness {}, roughness {}",
+        list(&factors.base_color),
+        short(factors.metallic),
+        short(factors.roughness)
+    );
+    if factors.normal_scale != 1.0 {
+        text += &format!(", normal scale {}", short(factors.normal_scale));
+    }
+    if factors.emissive != [0.0; 3] {
+        text += &format!(", emission {}", list(&factors.emissive));
+    }
+    text
+}
+
+/// A factor, at most three digits behind the point.
+fn short(value: f32) -> String {
+    let text = format!("{value:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 fn mips(runtime: &RuntimeReport) -> String {

@@ -16,7 +16,7 @@ use kinran_scene::Scene;
 
 use crate::model::Model;
 use crate::surfaces::{Mips, scene_surfaces};
-use crate::view::{EnvironmentChoice, View, ViewArgs, environment};
+use crate::view::{EnvironmentChoice, View, ViewArgs, environment, file_name};
 use crate::{Error, Progress};
 
 /// Textures of every material of a model.
@@ -242,7 +242,9 @@ impl Work {
                 let view = View::new(&scene, &path.to_string_lossy(), &args)?;
                 let plain = vec![None; scene.materials.len()];
                 let prepared = view.scene(&scene, plain, &progress)?;
-                let warnings = scene.warnings.iter().chain(view.environment_notes()).cloned().collect();
+                let idle = args.refuse_idle(&scene, &file_name(&path)).err().map(|idle| idle.to_string());
+                let told = scene.warnings.iter().chain(view.environment_notes()).cloned();
+                let warnings = told.chain(idle).collect();
                 let opened = Opened {
                     name: path.to_string_lossy().into_owned(),
                     mips: Mips::of(&scene),

@@ -40,8 +40,13 @@ fn what_init_writes_is_baked_as_it_stands() {
     // One whose normals are none: its texels say so.
     std::fs::create_dir_all(root.join("materials/plain")).unwrap();
     grey(&root.join("materials/plain/plain_normal.png"));
-    material(&root.join("done"), "done");
-    std::fs::write(root.join("done/done.kinran.json"), "{}").unwrap();
+    assert_eq!(
+        kinran(&["bake", text(&root.join("materials/tin")), "-o", text(&root.join("done"))]).code,
+        Some(0)
+    );
+    // One that was baked where it lies.
+    let lead = root.join("materials/lead");
+    assert_eq!(kinran(&["bake", text(&lead), "-o", text(&lead)]).code, Some(0));
     material(&root.join(".hidden"), "hidden");
     std::fs::create_dir_all(root.join("notes")).unwrap();
     std::fs::write(root.join("notes/readme.txt"), "nothing").unwrap();
@@ -54,6 +59,8 @@ fn what_init_writes_is_baked_as_it_stands() {
     std::fs::write(root.join("props/lamp.glb"), glb()).unwrap();
     std::fs::write(root.join("props/tin.glb"), glb()).unwrap();
     std::fs::write(root.join("props/torn.glb"), &glb()[..100]).unwrap();
+    let bare = r#"{"asset":{"version":"2.0"},"images":[{"uri":"gone.png"},{"uri":"lost.png"}]}"#;
+    std::fs::write(root.join("props/bare.gltf"), bare).unwrap();
     std::fs::write(root.join("props/cow.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     // Targets: one whose tile is told by its name, one whose is not.
     for tile in ["steel", "rust"] {
@@ -79,6 +86,7 @@ fn what_init_writes_is_baked_as_it_stands() {
         "materials/odd",
         "materials/plain",
         "props/torn.glb",
+        "props/bare.gltf",
         "props/cow.obj",
         "targets/boot_color.png",
         "later",
@@ -142,6 +150,16 @@ fn a_folder_of_folders_is_told_the_way() {
     );
     assert_eq!(kinran(&["init", text(&root)]).code, Some(0));
     refused(&["bake", text(&root)], &["materials: ", "`kinran bake ", "kinran.toml`"]);
+    // Folders that cannot be baked are counted and named, also where there is nothing else.
+    std::fs::remove_file(root.join("kinran.toml")).unwrap();
+    std::fs::create_dir(root.join("wood")).unwrap();
+    grey(&root.join("wood/wood_normal.png"));
+    let failing = ["1 that cannot be baked (wood: ", "not a tangent-space normal map"];
+    refused(&["bake", text(&root)], &[&["2 folders with maps, and "], &failing[..]].concat());
+    for name in ["tin", "lead"] {
+        std::fs::remove_dir_all(root.join(name)).unwrap();
+    }
+    refused(&["bake", text(&root)], &["what is below it cannot be baked: wood: ", failing[1]]);
     std::fs::create_dir(folder.path().join("empty")).unwrap();
     refused(&["bake", text(&folder.path().join("empty"))], &["no maps found"]);
     refused(&["init", text(&folder.path().join("empty"))], &["empty: ", "name another folder"]);

@@ -73,7 +73,7 @@ fn links() -> Vec<u8> {
 }
 
 /// Flags that frame no picture and change none, or whose values make no other one here.
-const OTHERS: [&str; 11] = [
+const OTHERS: [&str; 12] = [
     "output",
     "sheet",
     "allow-outside",
@@ -87,6 +87,7 @@ const OTHERS: [&str; 11] = [
     "quiet",
     "verbose",
     "json",
+    "force",
     "help",
 ];
 

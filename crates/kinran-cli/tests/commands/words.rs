@@ -203,3 +203,155 @@ fn a_pipe_hears_nothing_of_long_work_or_sees_bars() {
     let line = told.expect("no line");
     assert!(line.contains(" %, ") && !line.contains('\u{1b}'), "{line:?}");
 }
+
+#[test]
+fn a_flag_that_changes_no_picture_is_swallowed() {
+    let (folder, model) = square();
+    let baked = folder.path().join("baked");
+    assert_eq!(kinran(&["bake", text(&model), "-o", text(&baked)]).code, Some(0));
+    let baked = baked.join("square.glb");
+    let (png, exr) = (folder.path().join("a.png"), folder.path().join("a.exr"));
+    for (model, picture, flags) in [
+        (&model, &png, &["--filter", "none", "--max-anisotropy", "4"][..]),
+        (&model, &png, &["--filter", "none", "--correlated", "off"]),
+        (&baked, &png, &["--correlated", "off"]),
+        (&model, &png, &["--skin-penumbra", "2"]),
+    ] {
+        let flag = if flags[0] == "--filter" { flags[2] } else { flags[0] };
+        let words = [&["render", text(model), "-o", text(picture)], flags].concat();
+        refused(&words, &[flag, "leave the flag out"]);
+    }
+    for flags in [["--exposure", "1"], ["--tonemap", "agx"]] {
+        let few = ["--size", "8", "--spp", "1"];
+        let said = kinran(&[&["render", text(&model), "-o", text(&exr)], &flags[..], &few].concat());
+        assert!(said.err.contains(&format!("{} has nothing to act on", flags[0])), "{}", said.err);
+    }
+    for (flags, said) in [
+        (&["--skin-penumbra", "2"][..], "no material is skin"),
+        (&["--env", "none", "--env-rotation", "20"], "no light from all around"),
+        (&["--filters", "ml,naive,ml"], "names ml twice"),
+        (&["--distances", "1,2,1"], "has 1 twice"),
+    ] {
+        refused(&[&["compare", text(&model)], flags].concat(), &[said]);
+    }
+    let out = folder.path().join("out");
+    let words = ["bake", text(&model), "-o", text(&out), "--container", "dds", "--zstd", "9"];
+    refused(&words, &["--zstd 9", "DDS files are not compressed"]);
+    let said = kinran(&["bake", text(&model), "-o", text(&out), "--estimate-normals"]);
+    assert!(said.err.contains("--estimate-normals has nothing to act on"), "{}", said.err);
+}
+
+#[test]
+fn a_flag_for_maps_that_are_as_they_should_be_is_swallowed() {
+    let folder = tempfile::tempdir().unwrap();
+    let color = |alpha: u8| {
+        let samples = (0..64).flat_map(|i| [200, 40, 30, if i % 2 == 0 { alpha } else { 255 }]).collect();
+        Image::new(8, 8, Channels::Rgba, Pixels::U8(samples)).unwrap()
+    };
+    write_png(&folder.path().join("tin_normal.png"), &bumps()).unwrap();
+    write_png(&folder.path().join("tin_color.png"), &color(255)).unwrap();
+    let out = folder.path().join("out");
+    let bake =
+        |flags: &[&str]| kinran(&[&["bake", text(folder.path()), "-o", text(&out)], flags].concat()).err;
+    for flags in [&["--force-normal"][..], &["--alpha-coverage", "0.5"]] {
+        let wanted = format!("{} has nothing to act on", flags[0]);
+        let said = bake(flags);
+        assert!(said.contains(&wanted), "{flags:?}: wanted {wanted}: {said}");
+        let said = bake(&[flags, &["--dry-run"]].concat());
+        assert!(said.contains(&wanted), "{flags:?} --dry-run: wanted {wanted}: {said}");
+    }
+    write_png(&folder.path().join("tin_color.png"), &color(0)).unwrap();
+    let said = bake(&["--alpha-coverage", "0.5"]);
+    assert!(!said.contains("nothing to act on"), "{said}");
+}
+
+#[test]
+fn a_picture_that_somebody_else_drew_is_lost() {
+    let (folder, model) = square();
+    let (png, exr) = (folder.path().join("a.png"), folder.path().join("a.exr"));
+    write_png(&png, &bumps()).unwrap();
+    std::fs::write(&exr, b"v/1\x01 of another program").unwrap();
+    let few = ["--size", "8", "--spp", "1"];
+    for picture in [&png, &exr] {
+        let before = std::fs::read(picture).unwrap();
+        let words = [&["render", text(&model), "-o", text(picture)], &few[..]].concat();
+        refused(&words, &["did not draw this picture", "--force"]);
+        assert_eq!(std::fs::read(picture).unwrap(), before);
+        // Its own it draws again, also where the first time was by force.
+        for more in [&["--force"][..], &[]] {
+            let said = kinran(&[&words[..], more].concat());
+            assert_eq!(said.code, Some(0), "{}", said.err);
+        }
+    }
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    for (command, file) in [("compare", "compare.png"), ("skin", "turn.png"), ("fuzz", "density.png")] {
+        write_png(&out.join(file), &bumps()).unwrap();
+        refused(&[command, text(&model), "-o", text(&out)], &[file, "did not draw this picture"]);
+    }
+}
+
+#[test]
+fn what_is_no_folder_of_maps_is_told_no_way() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, way) in [
+        ("brick.zip", "unpack it"),
+        ("brick.sbsar", "export its maps"),
+        ("brick.fbx", "save it as .glb"),
+        ("brick_normal.png", "put the maps of a material into a folder"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, "any").unwrap();
+        refused(&["bake", text(&path)], &[name, way]);
+    }
+    refused(&["inspect", text(folder.path())], &["is a folder", "--dry-run"]);
+    let baked = folder.path().join("baked");
+    std::fs::create_dir(&baked).unwrap();
+    std::fs::write(baked.join("lamp.glb"), glb()).unwrap();
+    refused(&["inspect", text(&baked)], &["is a folder", "lamp.glb"]);
+    let said = kinran(&["inspect", "--check", text(&baked.join("lamp.glb"))]);
+    assert!(said.code == Some(0) && said.out.contains("no rule was looked at"), "{}{}", said.out, said.err);
+}
+
+#[test]
+fn a_model_with_torn_images_cannot_be_looked_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    let json = r#"{"asset":{"version":"2.0"},
+        "images":[{"uri":"gone.png"},{"uri":"lost.png"},{"uri":"torn.png"}],
+        "textures":[{"source":0},{"source":1},{"source":2}],
+        "materials":[{"name":"m","alphaMode":"MASK","doubleSided":true,"normalTexture":{"index":0},
+        "occlusionTexture":{"index":1},"pbrMetallicRoughness":{"metallicFactor":0.25,"baseColorTexture":{"index":2}}}]}"#;
+    std::fs::write(&path, json).unwrap();
+    std::fs::write(folder.path().join("torn.png"), b"\x89PNG\r\n").unwrap();
+    let said = kinran(&["inspect", text(&path)]);
+    assert_eq!(said.code, Some(0), "{}", said.err);
+    for wanted in [
+        "gone.png",
+        "lost.png",
+        "torn.png",
+        "save it again",
+        "metalness 0.25",
+        "mask below 0.5, double-sided",
+        "one of its images cannot be read",
+    ] {
+        assert!(said.out.contains(wanted), "wanted {wanted} in {}", said.out);
+    }
+    let out = folder.path().join("out");
+    let wanted = ["\"gone.png\"", "nor can \"lost.png\"", "put them beside the model"];
+    refused(&["bake", text(&path), "-o", text(&out), "--all-textures"], &wanted);
+}
+
+/// What lies on no texture coordinates shows one texel; what is baked for it is for nothing.
+#[test]
+fn a_mesh_without_texture_coordinates_is_baked_in_silence() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("square.glb");
+    let bytes = glb();
+    let at = bytes.windows(10).position(|word| word == b"TEXCOORD_0").unwrap();
+    std::fs::write(&path, [&bytes[..at], b"_EXCOORD_0", &bytes[at + 10..]].concat()).unwrap();
+    for more in ["--quiet", "--dry-run"] {
+        let said = kinran(&["bake", text(&path), "-o", text(&folder.path().join("out")), more, "--json"]);
+        assert!(said.out.contains("has no TEXCOORD_0"), "{}{}", said.out, said.err);
+    }
+}

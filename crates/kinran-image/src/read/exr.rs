@@ -23,7 +23,7 @@ pub(super) fn decode(
 ) -> Result<Image, String> {
     let damaged = |e: exr::error::Error| match e {
         exr::error::Error::NotSupported(e) => format!("{e}; save it flat, with ZIP compression"),
-        e => format!("{e}; the file is damaged or truncated"),
+        e => format!("{e}; the file is damaged or truncated, save it again"),
     };
     let meta = MetaData::read_from_buffered(&mut file, false).map_err(damaged)?;
     file.rewind().map_err(|e| e.to_string())?;
@@ -81,7 +81,7 @@ pub(super) fn decode(
         .and_then(|chunks| chunks.decompress_parallel(false, insert))
         .map_err(damaged)?;
     if missing > 0 {
-        return Err("blocks of texels are missing; the file is damaged or truncated".into());
+        return Err("blocks of texels are missing; the file is damaged or truncated, save it again".into());
     }
 
     let channels = [Channels::R, Channels::Rg, Channels::Rgb, Channels::Rgba][n - 1];

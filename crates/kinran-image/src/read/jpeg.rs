@@ -18,7 +18,7 @@ pub(super) fn decode(mut file: impl Read, stored: u64) -> Result<Image, String> 
     let last = |marker: u8| bytes.windows(2).rposition(|w| w == [0xff, marker]);
     let (start_of_scan, end_of_image) = (last(0xda), last(0xd9));
     if start_of_scan.is_none() || end_of_image < start_of_scan {
-        return Err("the file ends too early, it is truncated".into());
+        return Err(crate::error::TRUNCATED.into());
     }
 
     // The decoder takes every image with Adobe's transform 0 for CMYK. It is told of YCbCr instead, and hands out the

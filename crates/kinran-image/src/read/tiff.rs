@@ -15,7 +15,7 @@ const ASSOCIATED: u32 = 1;
 pub(super) fn decode(file: impl Read + Seek, stored: u64) -> Result<Image, String> {
     let damaged = |e: tiff::TiffError| match e {
         tiff::TiffError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
-            "the file ends too early, it is truncated".into()
+            crate::error::TRUNCATED.into()
         }
         tiff::TiffError::UnsupportedError(e) => format!("{e}; save it as an 8- or 16-bit PNG"),
         e => format!("{e}; the file is damaged"),

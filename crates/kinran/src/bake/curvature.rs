@@ -52,7 +52,7 @@ pub(super) fn add_normals(
     task: Task<'_>,
 ) -> Result<bool, Error> {
     // Normals are the mesh's own, whatever its joints make of them.
-    let needs = Needs { geometry: true, rest_pose: false, maps: Maps::None, reflectance: false };
+    let needs = Needs { geometry: true, rest_pose: false, maps: Maps::None, ..Needs::NONE };
     let scene = Scene::load_in(files, document.path(), &how.allow_outside, &needs, &|_| {}, &untold)?;
     if !scene.primitives.iter().any(|p| p.source.lacks_normals) {
         return Ok(false);

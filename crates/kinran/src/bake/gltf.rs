@@ -88,18 +88,24 @@ pub fn understand_gltf(
 ) -> Result<Understood, Error> {
     let mut document = Document::open_in(files, input, &how.allow_outside)?;
     let (smoothed, mut files) = (Memory::new(), files);
-    if how.estimate_normals && curvature::add_normals(&mut document, files, how, task)? {
-        for (path, bytes) in document.pack_in_memory(input)?.files {
-            smoothed.insert(path, bytes);
+    let mut idle = None;
+    if how.estimate_normals {
+        if curvature::add_normals(&mut document, files, how, task)? {
+            for (path, bytes) in document.pack_in_memory(input)?.files {
+                smoothed.insert(path, bytes);
+            }
+            files = &smoothed;
+            document = Document::open_in(files, input, &[])?;
+        } else {
+            idle = Some("--estimate-normals has nothing to act on: every mesh has normals".to_owned());
         }
-        files = &smoothed;
-        document = Document::open_in(files, input, &[])?;
     }
     let needs = Needs {
         geometry: how.asks(&document),
         rest_pose: true,
         maps: if how.all_textures { Maps::Plain } else { Maps::Surface },
         reflectance: how.textures.is_correlated(),
+        ..Needs::NONE
     };
     let reading = task.begin(Stage::Reading, file_name(input), 0)?;
     let expect = |units| reading.expect(units);
@@ -113,7 +119,11 @@ pub fn understand_gltf(
         );
     }
     curvature::mark_skin(&how.skin, &mut scene, &mut document)?;
-    let (surfaces, warnings) = surfaces(input, how, &scene, &document);
+    let (surfaces, mut warnings) = surfaces(input, how, &scene, &document);
+    if !needs.geometry {
+        warnings.extend(without_uvs(&document, &scene));
+    }
+    warnings.extend(idle);
     Ok(Understood { scene, document, surfaces, warnings })
 }
 
@@ -481,6 +491,39 @@ fn check(
     out.expect(&names, space)
 }
 
+/// A sentence for each material whose maps lie on texture coordinates that a primitive lacks. Geometry that is read tells it
+/// itself.
+fn without_uvs(document: &Document, scene: &Scene) -> Vec<String> {
+    let list = |value: &Value, member: &str| value.get(member).and_then(Value::as_array).cloned();
+    let mut warnings = Vec::new();
+    for (index, material) in scene.materials.iter().enumerate() {
+        let Some(set) =
+            material.normal.as_ref().or(material.metallic_roughness.as_ref()).map(|map| map.uv_set)
+        else {
+            continue;
+        };
+        let meshes = document.json().get("meshes").and_then(Value::as_array).into_iter().flatten();
+        let lacking = meshes.enumerate().find_map(|(m, mesh)| {
+            let primitives = list(mesh, "primitives").unwrap_or_default();
+            let lacks = |primitive: &Value| {
+                let attribute = |name: &str| primitive.get("attributes").and_then(|a| a.get(name));
+                primitive.get("material").and_then(Value::as_u64) == Some(index as u64)
+                    && attribute("POSITION").is_some()
+                    && attribute(&format!("TEXCOORD_{set}")).is_none()
+            };
+            primitives.iter().position(lacks).map(|p| (m, p))
+        });
+        warnings.extend(lacking.map(|(m, p)| {
+            format!(
+                "mesh {m}, primitive {p} has no TEXCOORD_{set}, which its material \"{}\" uses: its maps show one texel \
+                 everywhere; unwrap it",
+                material.name
+            )
+        }));
+    }
+    warnings
+}
+
 /// The surfaces of a document's materials; materials that share one share its textures.
 fn surfaces(
     input: &Path,
@@ -537,8 +580,16 @@ fn surfaces(
     }
     let skin = scene.primitives.iter().any(|p| how.wants(scene, p));
     if !apart && surfaces.is_empty() && !how.all_textures && !skin {
+        let has_others = scene
+            .materials
+            .iter()
+            .any(|m| [&m.base_color, &m.emissive, &m.occlusion].into_iter().any(Option::is_some));
+        let others = match has_others {
+            true => "; --all-textures bakes its other maps",
+            false => ", nor any other: there is nothing to bake",
+        };
         warnings.push(format!(
-            "{}: no material has a normal, a roughness or an anisotropy map; nothing but --all-textures would bake anything",
+            "{}: no material has a normal, a roughness or an anisotropy map{others}",
             file_name(input)
         ));
     }

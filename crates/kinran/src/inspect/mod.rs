@@ -33,7 +33,9 @@ use crate::names::{counted, file_name};
 use crate::{Error, Task};
 
 pub use image::{ChannelReport, ImageReport, LENGTH_TOLERANCE, NormalReport};
-pub use model::{CameraReport, MapReport, MaterialReport, ModelReport, PrimitiveReport, RuntimeReport};
+pub use model::{
+    CameraReport, Factors, MapReport, MaterialReport, ModelReport, PrimitiveReport, RuntimeReport,
+};
 pub use statistics::{Range, Statistics};
 pub use texture::{LevelReport, TextureReport};
 pub use written::{Member, NamedFile, State, WrittenReport};

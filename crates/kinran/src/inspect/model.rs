@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use kinran_bake::aniso::RoughnessMaps;
 use kinran_bake::{NoSurface, material_surface};
 use kinran_image::{Files, Pixels, full_level_count};
-use kinran_scene::{Document, LightKind, Material, Needs, Scene, TextureRef};
+use kinran_scene::{AlphaMode, Document, LightKind, Material, Needs, Scene, TextureRef};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -60,12 +60,36 @@ pub struct PrimitiveReport {
 pub struct MaterialReport {
     /// Its name.
     pub name: String,
+    /// What its maps are multiplied with, or what it is without them.
+    pub factors: Factors,
+    /// `opaque`, `mask` or `blend`.
+    pub alpha: &'static str,
+    /// Below it a texel is a hole, where `alpha` is `mask`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alpha_cutoff: Option<f32>,
+    /// Whether its back is drawn too.
+    pub double_sided: bool,
     /// Its textures.
     pub maps: Vec<MapReport>,
     /// What `kinran bake` does with it.
     pub bake: String,
     /// Extensions that neither change the bake nor the picture.
     pub ignored_extensions: Vec<String>,
+}
+
+/// Factors of a material, as glTF has them.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct Factors {
+    /// Base colour, linear, and alpha.
+    pub base_color: [f32; 4],
+    /// Metalness.
+    pub metallic: f32,
+    /// Perceptual roughness.
+    pub roughness: f32,
+    /// Of the normal map's x and y.
+    pub normal_scale: f32,
+    /// Emission, linear.
+    pub emissive: [f32; 3],
 }
 
 /// A texture of a material.
@@ -120,7 +144,8 @@ pub(super) fn inspect(
 ) -> Result<ModelReport, Error> {
     let reading = task.begin(Stage::Reading, file_name(path), 0)?;
     let expect = |units| reading.expect(units);
-    let scene = Scene::load_in(files, path, allowed, &Needs::ALL, &expect, &|units| reading.tick(units))?;
+    let needs = Needs { forgiving: true, ..Needs::ALL };
+    let scene = Scene::load_in(files, path, allowed, &needs, &expect, &|units| reading.tick(units))?;
     drop(reading);
     // An OBJ has no document, and no extensions.
     let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
@@ -138,6 +163,23 @@ pub(super) fn inspect(
     });
     let materials = scene.materials.iter().enumerate().map(|(i, m)| MaterialReport {
         name: m.name.clone(),
+        factors: Factors {
+            base_color: m.base_color_factor.to_array(),
+            metallic: m.metallic_factor,
+            roughness: m.roughness_factor,
+            normal_scale: m.normal_scale,
+            emissive: m.emissive_factor.to_array(),
+        },
+        alpha: match m.alpha_mode {
+            AlphaMode::Opaque => "opaque",
+            AlphaMode::Mask { .. } => "mask",
+            AlphaMode::Blend => "blend",
+        },
+        alpha_cutoff: match m.alpha_mode {
+            AlphaMode::Mask { cutoff } => Some(cutoff),
+            AlphaMode::Opaque | AlphaMode::Blend => None,
+        },
+        double_sided: m.double_sided,
         maps: maps(&scene, document.as_ref(), m),
         bake: bake(&scene, i),
         ignored_extensions: m.ignored_extensions.clone(),
@@ -217,6 +259,12 @@ fn maps(scene: &Scene, document: Option<&Document>, m: &Material) -> Vec<MapRepo
 
 /// What `kinran bake` does with a material, in words.
 fn bake(scene: &Scene, material: usize) -> String {
+    let m = &scene.materials[material];
+    let anisotropy = m.anisotropy.as_ref().and_then(|a| a.texture.as_ref());
+    let maps = [m.normal.as_ref(), anisotropy, m.metallic_roughness.as_ref()];
+    if maps.into_iter().flatten().any(|map| scene.images.get(map.image).is_none_or(Option::is_none)) {
+        return "nothing: one of its images cannot be read".into();
+    }
     match material_surface(scene, material) {
         Ok(surface) if surface.place.is_none() => "nothing: its anisotropy is in factors alone".into(),
         Ok(surface) => {

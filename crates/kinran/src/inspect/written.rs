@@ -6,7 +6,7 @@ use kinran_bake::cache::relative;
 use kinran_image::Files;
 use schemars::JsonSchema;
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Number, Value};
 
 use super::{counted, file_name, read};
 use crate::Error;
@@ -113,14 +113,28 @@ fn named_file(files: &dyn Files, report: &Path, file: WrittenFile) -> NamedFile 
     NamedFile { file: file.file, bytes: file.bytes, state }
 }
 
+/// A number as people read it: of a fraction four digits.
+fn short(number: &Number) -> String {
+    let (Some(value), false) = (number.as_f64(), number.is_i64() || number.is_u64()) else {
+        return number.to_string();
+    };
+    let digits = 3 - value.abs().log10().floor().clamp(-9.0, 3.0) as i32;
+    let text = format!("{value:.*}", digits as usize);
+    match text.split_once('.') {
+        Some(_) => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        None => text,
+    }
+}
+
 fn members(json: &Value) -> Vec<Member> {
     let members = json.as_object().into_iter().flatten();
     let shown = members.filter(|(name, _)| !["written", "kept", "warnings"].contains(&name.as_str()));
     let value = |value: &Value| match value {
         Value::String(text) => Some(text.clone()),
-        Value::Number(_) | Value::Bool(_) => Some(value.to_string()),
+        Value::Bool(_) => Some(value.to_string()),
+        Value::Number(number) => Some(short(number)),
         Value::Array(list) if list.iter().all(Value::is_number) && list.len() <= 4 => {
-            Some(list.iter().map(Value::to_string).collect::<Vec<_>>().join(" x "))
+            Some(list.iter().filter_map(Value::as_number).map(short).collect::<Vec<_>>().join(" x "))
         }
         Value::Array(list) => Some(counted(list.len(), "entry", "entries")),
         Value::Object(_) | Value::Null => None,

@@ -12,6 +12,7 @@ use notify::{Event, RecommendedWatcher, RecursiveMode, Watcher};
 
 use super::{Failures, build, cache_folder};
 use crate::bake::Args;
+use crate::progress::Bars;
 use crate::{Console, Error};
 
 /// Quiet after a change before it is baked: programs save in several steps, and several files. Chosen by eye.
@@ -36,7 +37,9 @@ pub(super) fn watch(args: &Args, console: &Console) -> Result<(), Error> {
         let watches = Watches::new(&folders, &ours(args), &tell);
         let note = watches.describe(&args.input, &folders);
         let started = Instant::now();
-        let result = build(args, console, &mut failures);
+        let bars = Bars::new(console.progress());
+        let result = build(args, bars.task(), &mut failures);
+        drop(bars);
         let took = started.elapsed();
         let said = match &result {
             Ok(built) => serde_json::to_string(&built.report).unwrap_or_default(),
