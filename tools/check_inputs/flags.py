@@ -28,6 +28,7 @@ FOLDER = [
     ["--unit-mm", "5"],
     ["--estimate-normals"],
     ["--all-textures"],
+    ["--separate-specular"],
     ["--curvature-dump", "json"],
     ["--allow-outside", "."],
     ["--map", "normal=nothing.png"],

@@ -3,25 +3,24 @@
 //! A texel of glTF says two colours by one colour b and one number m: what scatters, `b (1 - m)`, and what reflects at
 //! normal incidence, `φ (1 - m) + b m`, φ being F0 of what is not metal (0.04). Averages of b and of m are neither of them: half
 //! gold, half black cloth would become half-metallic brown, which scatters where nothing does and reflects half of what gold
-//! there reflects. What a footprint shows is the mean d of what scatters and the mean f of what reflects, in linear light, and
-//! the pair is chosen that is nearest to both,
-//!
-//! ```text
-//! min  Σ (b (1-m) - d)² + (b m + φ (1-m) - f)²,   0 ≤ b, m ≤ what factors allow, sums over red, green and blue.
-//! ```
-//!
-//! For a given m, with `s = 1 - m` and `g = f - φ s`, b is the projection of (d, g) on (s, m): `b = (s d + m g) / (s² + m²)`.
-//! What is left is a function of m alone. It may have two minima (dark colours: φ is neither scattered nor b's), so it is looked
-//! at all over and then more and more closely (`together`).
+//! there reflects. What a footprint shows is the mean of what scatters and the mean of what reflects, in linear light, and
+//! the texel is chosen that is nearest to both: by base colour and metalness (`pair.rs`), or by those and φ (`separate.rs`).
 
-use kinran_image::srgb::byte_from_linear;
-use kinran_image::{Cancelled, Image, Tick, Transfer, full_level_count};
+mod pair;
+mod separate;
+
+use kinran_image::srgb::{byte_from_linear, linear_from_byte};
+use kinran_image::{Cancelled, Image, Tick, Transfer, full_level_count, level_size};
+use kinran_shading::DIELECTRIC_F0;
 
 use crate::aniso::maps::read_scalar;
 use crate::aniso::reflectance::read_color;
 use crate::aniso::{ColorMap, Kernel, Reflectance, ReflectanceMaps, ScalarMap, Taps};
 use crate::channels::{Place, read_channel};
 use crate::mips::{PlaneBand, PlaneRows, Rgba8Level, TILE, finest_level, reduce_levels, unorm8};
+
+use self::pair::{Limits, Means, pair};
+use self::separate::{Separate, separate};
 
 /// Levels of base colour and of metalness, finest first, without their factors.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,6 +29,14 @@ pub struct BaseAndMetal {
     pub color: Vec<Rgba8Level>,
     /// A byte for each texel, of the size of the surface.
     pub metallic: Vec<Vec<u8>>,
+    /// F0 of what is not metal relative to [`specular_white`], sRGB and opaque, of the smaller of both sizes; none unless that
+    /// was asked for.
+    pub specular: Vec<Rgba8Level>,
+}
+
+/// F0 that a white texel of [`BaseAndMetal::specular`] stands for, 1.011: glTF's 0.04 is a code (56) and mirrors are another.
+pub fn specular_white() -> f32 {
+    DIELECTRIC_F0 / linear_from_byte(byte_from_linear(DIELECTRIC_F0))
 }
 
 /// Why base colour and metalness are averaged one by one.
@@ -52,9 +59,10 @@ pub enum Apart {
     Cancelled(#[from] Cancelled),
 }
 
-/// Base colour and metalness of every level, for a surface of size `surface`. Level 0 is as authored. Where the sizes of base
-/// colour and surface are apart by a power of two, each level stands for the same texels of the larger one; `tick` is told of
-/// the texels of all its levels.
+/// Base colour and metalness of every level, for a surface of size `surface`; where `separate` says so, with F0 of what is not
+/// metal, which glTF takes from `KHR_materials_specular`. Level 0 is as authored. Where the sizes of base colour and surface are
+/// apart by a power of two, each level stands for the same texels of the larger one; `tick` is told of the texels of all its
+/// levels.
 ///
 /// # Errors
 /// [`Apart`] where they are not chosen together; nothing was told then, or `tick` stopped the work.
@@ -62,6 +70,7 @@ pub fn base_and_metal(
     reflectance: &Reflectance,
     surface: (u32, u32),
     kernel: Kernel,
+    separate: bool,
     tick: &Tick<'_>,
 ) -> Result<BaseAndMetal, Apart> {
     let Plan { base, image, metallic, dielectric, of_color, of_surface } = plan(reflectance, surface)?;
@@ -71,26 +80,46 @@ pub fn base_and_metal(
     let source = Rows { base, metallic, size, reflectance };
     let limits = Limits { base: base.factor.to_array(), metallic: metallic.factor };
     let bands = reduce_levels(&source, size, kernel, wrap, |band, (): &mut ()| {
-        let wanted = (band.level > of_color, band.level > of_surface);
-        let chosen = choose_band(&band, dielectric, limits, wanted);
+        let (color, metal) = (band.level > of_color, band.level > of_surface);
+        let chosen = choose_band(
+            &band,
+            dielectric,
+            limits,
+            Wanted { color, metal, specular: separate && color && metal },
+        );
         tick(band.width as u64 * band.rows as u64)?;
         Ok::<_, Cancelled>(chosen)
     })?;
 
     let mut color = vec![finest_level(image, own, Transfer::Srgb, wrap, &|_| tick(0))?];
     let mut metal = vec![finest_metal(metallic, surface, reflectance)];
+    let mut specular = Vec::new();
+    if separate {
+        let (width, height) = (own.0.min(surface.0), own.1.min(surface.1));
+        let texel = specular_texel(dielectric, specular_white());
+        specular.push(Rgba8Level { width, height, rgba8: texel.repeat(width as usize * height as usize) });
+    }
     tick(u64::from(size.0) * u64::from(size.1))?;
     for (level, bands) in (1..full_level_count(size.0, size.1)).zip(bands) {
-        let (rgba8, metallic): (Vec<_>, Vec<_>) = bands.into_iter().unzip();
+        let (width, height) = (level_size(size.0, level), level_size(size.1, level));
+        let joined = |of: fn(&Chosen) -> &[u8]| bands.iter().map(of).collect::<Vec<_>>().concat();
         if level > of_color {
-            let (width, height) = ((size.0 >> level).max(1), (size.1 >> level).max(1));
-            color.push(Rgba8Level { width, height, rgba8: rgba8.concat() });
+            color.push(Rgba8Level { width, height, rgba8: joined(|chosen| &chosen.color) });
         }
         if level > of_surface {
-            metal.push(metallic.concat());
+            metal.push(joined(|chosen| &chosen.metal));
+        }
+        if separate && level > of_color.max(of_surface) {
+            specular.push(Rgba8Level { width, height, rgba8: joined(|chosen| &chosen.specular) });
         }
     }
-    Ok(BaseAndMetal { color, metallic: metal })
+    Ok(BaseAndMetal { color, metallic: metal, specular })
+}
+
+/// Size of [`BaseAndMetal::specular`]; `None` where [`base_and_metal`] would not choose them together.
+pub fn specular_size(reflectance: &Reflectance, surface: (u32, u32)) -> Option<(u32, u32)> {
+    let image = plan(reflectance, surface).ok()?.image;
+    Some((image.width.min(surface.0), image.height.min(surface.1)))
 }
 
 /// Why [`base_and_metal`] would not choose them together, if it would not.
@@ -208,23 +237,32 @@ impl PlaneRows for Rows<'_> {
     }
 }
 
-/// The most that textures can say: their factors.
+/// What of a level's texels is wanted.
 #[derive(Clone, Copy)]
-struct Limits {
-    base: [f32; 3],
-    metallic: f32,
+struct Wanted {
+    color: bool,
+    metal: bool,
+    specular: bool,
 }
 
-/// RGBA and metalness of a band's texels, where they are wanted.
-fn choose_band(
-    band: &PlaneBand,
-    dielectric: [f32; 3],
-    limits: Limits,
-    (color_wanted, metal_wanted): (bool, bool),
-) -> (Vec<u8>, Vec<u8>) {
-    let texels = band.width * band.rows;
-    let mut rgba8 = Vec::with_capacity(if color_wanted { 4 * texels } else { 0 });
-    let mut metal = Vec::with_capacity(if metal_wanted { texels } else { 0 });
+/// What was chosen for a band's texels; empty where it was not wanted.
+struct Chosen {
+    /// RGBA.
+    color: Vec<u8>,
+    metal: Vec<u8>,
+    /// RGBA.
+    specular: Vec<u8>,
+}
+
+/// What is wanted of a band's texels.
+fn choose_band(band: &PlaneBand, dielectric: [f32; 3], limits: Limits, wanted: Wanted) -> Chosen {
+    let texels = |wanted: bool| if wanted { band.width * band.rows } else { 0 };
+    let mut chosen = Chosen {
+        color: Vec::with_capacity(4 * texels(wanted.color)),
+        metal: Vec::with_capacity(texels(wanted.metal)),
+        specular: Vec::with_capacity(4 * texels(wanted.specular)),
+    };
+    let white = specular_white();
     let scale = |v: f32, most: f32| if most > 0.0 { v / most } else { 0.0 };
     for row in band.samples.chunks_exact(PLANES * band.width) {
         for x in 0..band.width {
@@ -234,178 +272,29 @@ fn choose_band(
                 of_metal: [plane(3), plane(4), plane(5)],
                 metallic: plane(6),
             };
-            let (base, metallic) = together(&means, dielectric, limits);
-            if color_wanted {
+            let (base, metallic) = if wanted.specular {
+                let Separate { base, specular, metallic } = separate(&means, dielectric, limits);
+                chosen.specular.extend(specular_texel(specular, white));
+                (base, metallic)
+            } else {
+                pair(&means, dielectric, limits)
+            };
+            if wanted.color {
                 for (v, most) in base.into_iter().zip(limits.base) {
-                    rgba8.push(byte_from_linear(scale(v, most)));
+                    chosen.color.push(byte_from_linear(scale(v, most)));
                 }
-                rgba8.push(unorm8(plane(7)));
+                chosen.color.push(unorm8(plane(7)));
             }
-            if metal_wanted {
-                metal.push(unorm8(scale(metallic, limits.metallic)));
+            if wanted.metal {
+                chosen.metal.push(unorm8(scale(metallic, limits.metallic)));
             }
         }
     }
-    (rgba8, metal)
+    chosen
 }
 
-/// Averages over a footprint.
-struct Means {
-    /// `b (1 - m)`.
-    scattered: [f32; 3],
-    /// `b m`.
-    of_metal: [f32; 3],
-    /// m.
-    metallic: f32,
-}
-
-/// Sum of squared errors of both colours below which the averages of b and m stay: each within a twentieth of the step of an
-/// 8-bit code at its darkest.
-const EXACT: f32 = 1e-9;
-
-/// Metalness is looked at in steps of an eighth first.
-const STEPS: usize = 8;
-
-/// Then in smaller ones, down to 1/1024, a quarter of a step of 8 bits.
-const FINEST: f32 = 1.0 / 1024.0;
-
-/// Base colour and metalness that together are nearest to what a footprint scatters and reflects. `dielectric` is F0 of what is
-/// not metal.
-fn together(means: &Means, dielectric: [f32; 3], limits: Limits) -> ([f32; 3], f32) {
-    let d = means.scattered;
-    let f: [f32; 3] = std::array::from_fn(|c| means.of_metal[c] + dielectric[c] * (1.0 - means.metallic));
-    // The base colour for a metalness, and their error.
-    let best = |m: f32| {
-        let s = 1.0 - m;
-        let inv = 1.0 / (s * s + m * m);
-        let (mut base, mut error) = ([0.0; 3], 0.0);
-        for c in 0..3 {
-            let g = f[c] - dielectric[c] * s;
-            let b = ((s * d[c] + m * g) * inv).clamp(0.0, limits.base[c]);
-            let (e_d, e_g) = (b * s - d[c], b * m - g);
-            error += e_d * e_d + e_g * e_g;
-            base[c] = b;
-        }
-        (base, error)
-    };
-
-    let averages: [f32; 3] = std::array::from_fn(|c| d[c] + means.of_metal[c]);
-    let cross = |c: usize| means.of_metal[c] - averages[c] * means.metallic;
-    if 2.0 * (0..3).map(|c| cross(c) * cross(c)).sum::<f32>() < EXACT {
-        return (averages, means.metallic);
-    }
-    let mut m = means.metallic.min(limits.metallic);
-    let (mut base, mut error) = best(m);
-    let mut look = |m: &mut f32, at: f32| {
-        let (b, e) = best(at);
-        if e < error {
-            (*m, base, error) = (at, b, e);
-        }
-    };
-    for i in 0..=STEPS {
-        look(&mut m, limits.metallic * i as f32 / STEPS as f32);
-    }
-    let mut step = limits.metallic / (2 * STEPS) as f32;
-    while step >= FINEST {
-        let middle = m;
-        look(&mut m, (middle - step).max(0.0));
-        look(&mut m, (middle + step).min(limits.metallic));
-        step *= 0.5;
-    }
-    (base, m)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Uniform in [0, 1).
-    fn uniform(state: &mut u32) -> f64 {
-        *state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-        f64::from(*state >> 8) / 16_777_216.0
-    }
-
-    /// Footprints of two to four materials, gold on cloth and dark ones among them, against every 1/2000 of metalness, in double
-    /// precision.
-    #[test]
-    fn another_pair_is_nearer_to_what_a_footprint_shows() {
-        let mut state = 5;
-        let (mut plain, mut mended) = (0.0, 0.0);
-        for i in 0..3000 {
-            let f0 = [0.04, 0.04, if i % 7 == 0 { 0.02 } else { 0.04 }];
-            let limits = match i % 5 {
-                0 => Limits { base: [0.9, 1.0, 0.7], metallic: 0.8 },
-                _ => Limits { base: [1.0; 3], metallic: 1.0 },
-            };
-            let (mut d, mut metal, mut m_mean) = ([0.0; 3], [0.0; 3], 0.0);
-            let count = 2 + i % 3;
-            for _ in 0..count {
-                let dark = if uniform(&mut state) < 0.4 { 0.05 } else { 1.0 };
-                let m = match uniform(&mut state) {
-                    v if v < 0.4 => 0.0,
-                    v if v < 0.8 => f64::from(limits.metallic),
-                    _ => uniform(&mut state) * f64::from(limits.metallic),
-                };
-                m_mean += m / count as f64;
-                for c in 0..3 {
-                    let b = dark * uniform(&mut state) * f64::from(limits.base[c]);
-                    d[c] += b * (1.0 - m) / count as f64;
-                    metal[c] += b * m / count as f64;
-                }
-            }
-            let f: [f64; 3] = std::array::from_fn(|c| metal[c] + f64::from(f0[c]) * (1.0 - m_mean));
-            let error = |b: [f64; 3], m: f64| -> f64 {
-                let term = |c: usize| {
-                    let reflected = b[c] * m + f64::from(f0[c]) * (1.0 - m);
-                    (b[c] * (1.0 - m) - d[c]).powi(2) + (reflected - f[c]).powi(2)
-                };
-                (0..3).map(term).sum()
-            };
-            // The best of a line of base colours, by thirds: no formula of the module.
-            let mut wanted = f64::INFINITY;
-            for step in 0..=2000 {
-                let m = f64::from(limits.metallic) * f64::from(step) / 2000.0;
-                let b = std::array::from_fn(|c| {
-                    let (mut lo, mut hi) = (0.0, f64::from(limits.base[c]));
-                    for _ in 0..40 {
-                        let (p, q) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
-                        let at = |v: f64| {
-                            let reflected = v * m + f64::from(f0[c]) * (1.0 - m);
-                            (v * (1.0 - m) - d[c]).powi(2) + (reflected - f[c]).powi(2)
-                        };
-                        if at(p) < at(q) { hi = q } else { lo = p }
-                    }
-                    0.5 * (lo + hi)
-                });
-                wanted = wanted.min(error(b, m));
-            }
-            let means = Means {
-                scattered: d.map(|v| v as f32),
-                of_metal: metal.map(|v| v as f32),
-                metallic: m_mean as f32,
-            };
-            let (b, m) = together(&means, f0, limits);
-            let got = error(b.map(f64::from), f64::from(m));
-            assert!(got <= wanted + 2e-5, "footprint {i}: wanted {wanted:e}, got {got:e} by {b:?}, {m}");
-            assert!(m <= limits.metallic && (0..3).all(|c| b[c] <= limits.base[c] + 1e-6), "{b:?}, {m}");
-            let averages: [f64; 3] = std::array::from_fn(|c| d[c] + metal[c]);
-            plain += error(averages, m_mean);
-            mended += got;
-        }
-        assert!(mended < 0.5 * plain, "sum of squared errors: {mended}, of plain averages {plain}");
-    }
-
-    /// One texel's pair is that texel's.
-    #[test]
-    fn a_footprint_of_one_material_becomes_another() {
-        let mut state = 11;
-        for i in 0..2000 {
-            let m = [0.0, 1.0, uniform(&mut state) as f32][i % 3];
-            let b: [f32; 3] = std::array::from_fn(|_| uniform(&mut state) as f32);
-            let means = Means { scattered: b.map(|b| b - b * m), of_metal: b.map(|b| b * m), metallic: m };
-            let (got, got_m) = together(&means, [0.04; 3], Limits { base: [1.0; 3], metallic: 1.0 });
-            let off = (0..3).map(|c| (got[c] - b[c]).abs()).fold((got_m - m).abs(), f32::max);
-            assert!(off < 1e-6, "wanted {b:?}, {m}, got {got:?}, {got_m}");
-        }
-    }
+/// The texel of sRGB that says this F0.
+fn specular_texel(f0: [f32; 3], white: f32) -> [u8; 4] {
+    let [r, g, b] = f0.map(|f0| byte_from_linear(f0 / white));
+    [r, g, b, 255]
 }

@@ -15,7 +15,7 @@ use kinran_bake::aniso::{
     ColorMap, Dielectric, Filter, Kernel, NormalMap, Reflectance, ReflectanceMaps, RoughnessMaps, ScalarMap,
     SurfaceMaps,
 };
-use kinran_bake::metal::{Apart, base_and_metal};
+use kinran_bake::metal::{Apart, BaseAndMetal, base_and_metal, specular_white};
 use kinran_bake::{Rgba8Level, linear_from_srgb, plain_levels};
 use kinran_image::{Channels, Image, Pixels, Transfer, read_image, untold};
 use kinran_scene::Wrap;
@@ -63,8 +63,9 @@ fn asset(folder: &Path, name: &str, metal: Option<u8>) -> Material {
     Material { name: name.into(), maps, color, metallic }
 }
 
-/// All texels of all levels, by each way: today's; with weights; with base colour and metalness together; with both.
-fn ways(material: &Material, filter: Filter) -> [Vec<Vec<Colored>>; 4] {
+/// All texels of all levels, by each way: today's; with weights; with base colour and metalness together; with both; with a
+/// specular colour too.
+fn ways(material: &Material, filter: Filter) -> [Vec<Vec<Colored>>; 5] {
     let (maps, size) = (&material.maps, material.maps.size());
     let reflectance = material.reflectance();
     let weighted = SurfaceMaps { weights: reflectance.weights(size).map(Arc::new), ..maps.clone() };
@@ -77,45 +78,47 @@ fn ways(material: &Material, filter: Filter) -> [Vec<Vec<Colored>>; 4] {
         plain_levels(&material.metallic, size, Transfer::Linear, Kernel::Box, wrap, &untold).unwrap();
     let plain_metal: Vec<Vec<u8>> =
         plain_metal.iter().map(|level| level.rgba8.iter().step_by(4).copied().collect()).collect();
-    let (color, metal) = match base_and_metal(&reflectance, size, Kernel::Box, &untold) {
-        Ok(pair) => (pair.color, pair.metallic),
-        Err(apart) => {
+    let [pair, triple] = [false, true].map(|separate| {
+        base_and_metal(&reflectance, size, Kernel::Box, separate, &untold).unwrap_or_else(|apart| {
             assert_eq!(apart, Apart::Alike, "{}", material.name);
-            (plain_color.clone(), plain_metal.clone())
-        }
-    };
+            BaseAndMetal { color: plain_color.clone(), metallic: plain_metal.clone(), specular: Vec::new() }
+        })
+    });
     let linear = |code: u8| linear_from_srgb(f32::from(code) / 255.0);
-    let join = |lobes: &[Vec<Surface>], color: &[Rgba8Level], metal: &[Vec<u8>]| {
-        lobes
-            .iter()
-            .zip(color.iter().zip(metal))
-            .map(|(lobes, (color, metal))| {
-                lobes
-                    .iter()
-                    .zip(color.rgba8.chunks_exact(4).zip(metal))
-                    .map(|(surface, (rgba, metal))| Colored {
-                        surface: *surface,
-                        base: vec3(linear(rgba[0]), linear(rgba[1]), linear(rgba[2])),
-                        metallic: f32::from(*metal) / 255.0,
-                    })
-                    .collect()
-            })
-            .collect::<Vec<Vec<Colored>>>()
+    let white = specular_white();
+    let join = |lobes: &[Vec<Surface>], color: &[Rgba8Level], metal: &[Vec<u8>], specular: &[Rgba8Level]| {
+        let rgb = |rgba: &[u8]| vec3(linear(rgba[0]), linear(rgba[1]), linear(rgba[2]));
+        let level = |level: usize| {
+            let specular = |i: usize| match specular.get(level) {
+                Some(level) => rgb(&level.rgba8[4 * i..]) * white,
+                None => Vec3::splat(0.04),
+            };
+            let texels = lobes[level].iter().zip(color[level].rgba8.chunks_exact(4).zip(&metal[level]));
+            let colored = texels.enumerate().map(|(i, (surface, (rgba, metal)))| Colored {
+                surface: *surface,
+                base: rgb(rgba),
+                metallic: f32::from(*metal) / 255.0,
+                specular: specular(i),
+            });
+            colored.collect()
+        };
+        (0..lobes.len()).map(level).collect::<Vec<Vec<Colored>>>()
     };
     [
-        join(&plain_lobes, &plain_color, &plain_metal),
-        join(&weighted_lobes, &plain_color, &plain_metal),
-        join(&plain_lobes, &color, &metal),
-        join(&weighted_lobes, &color, &metal),
+        join(&plain_lobes, &plain_color, &plain_metal, &[]),
+        join(&weighted_lobes, &plain_color, &plain_metal, &[]),
+        join(&plain_lobes, &pair.color, &pair.metallic, &[]),
+        join(&weighted_lobes, &pair.color, &pair.metallic, &[]),
+        join(&weighted_lobes, &triple.color, &triple.metallic, &triple.specular),
     ]
 }
 
 /// Geometric means of errors, relative to those of today's way.
 struct Gain {
     name: String,
-    /// Linear radiance and display values, each with weights, together, both.
-    l2: [f64; 3],
-    display: [f64; 3],
+    /// Linear radiance and display values, each with weights, together, both, with a specular colour too.
+    l2: [f64; 4],
+    display: [f64; 4],
 }
 
 /// By some footprints of levels 2, 3 and 4.
@@ -141,7 +144,7 @@ fn gain(material: &Material, filter: Filter) -> Gain {
         })
         .collect();
     let mean = |value: &dyn Fn(&SeenError) -> f64| {
-        [1, 2, 3].map(|way| {
+        [1, 2, 3, 4].map(|way| {
             let logs = errors.iter().map(|e| (value(&e[way]) / value(&e[0])).ln());
             (logs.sum::<f64>() / errors.len() as f64).exp()
         })
@@ -149,18 +152,18 @@ fn gain(material: &Material, filter: Filter) -> Gain {
     Gain { name: material.name.clone(), l2: mean(&|e| e.l2), display: mean(&|e| e.display) }
 }
 
-/// Prints gains, and the geometric mean of those by both.
-fn means(filter: Filter, gains: &[Gain]) -> (f64, f64) {
-    println!("{:22} L2: W, E, both       display: W, E, both", filter.name());
-    for Gain { name, l2: [w, e, both], display: [dw, de, dboth] } in gains {
-        println!("{name:22} {w:.3} {e:.3} {both:.3}   {dw:.3} {de:.3} {dboth:.3}");
+/// Prints gains; gives the geometric means of L2 and display, by both and with a specular colour too.
+fn means(filter: Filter, gains: &[Gain]) -> [[f64; 2]; 2] {
+    println!("{:22} L2: W, E, both, separate     display: W, E, both, separate", filter.name());
+    for Gain { name, l2: [w, e, both, s], display: [dw, de, dboth, ds] } in gains {
+        println!("{name:22} {w:.3} {e:.3} {both:.3} {s:.3}   {dw:.3} {de:.3} {dboth:.3} {ds:.3}");
     }
     let mean = |value: &dyn Fn(&Gain) -> f64| {
         (gains.iter().map(|g| value(g).ln()).sum::<f64>() / gains.len() as f64).exp()
     };
-    let (l2, display) = (mean(&|g| g.l2[2]), mean(&|g| g.display[2]));
-    println!("{:22} {l2:.3}   {display:.3}", "mean by both");
-    (l2, display)
+    let means = [2, 3].map(|way| [mean(&|g| g.l2[way]), mean(&|g| g.display[way])]);
+    println!("{:22} {:.3?}   {:.3?}", "mean", [means[0][0], means[1][0]], [means[0][1], means[1][1]]);
+    means
 }
 
 /// A scalar noise of two octaves in [0, 1], smooth and tiling, over `side` texels.
@@ -245,7 +248,11 @@ fn colour_and_lobe_of_mixed_metal_are_filtered_apart() {
     let materials = generated();
     for (filter, most_l2, most_display) in GENERATED_LIMITS {
         let gains: Vec<Gain> = materials.iter().map(|material| gain(material, filter)).collect();
-        let (l2, display) = means(filter, &gains);
+        let [[l2, display], [own_l2, own_display]] = means(filter, &gains);
+        assert!(
+            own_l2 <= l2 && own_display <= 0.9 * display,
+            "{filter:?}: {own_l2}, {own_display} with a specular colour"
+        );
         assert!(l2 <= most_l2, "{filter:?}: L2 {l2} of today's, wanted at most {most_l2}");
         assert!(display <= most_display, "{filter:?}: display {display}, wanted at most {most_display}");
     }
@@ -259,7 +266,11 @@ fn sample_assets_of_mixed_metal_are_filtered_apart() {
     let pure = ["acg_metal009", "ph_metal_plate_02", "acg_diamondplate008c"];
     for filter in [Filter::Ml, Filter::Dpd, Filter::Linear] {
         let gains: Vec<Gain> = mixed.iter().map(|name| gain(&asset(&assets, name, None), filter)).collect();
-        let (l2, display) = means(filter, &gains);
+        let [[l2, display], [own_l2, own_display]] = means(filter, &gains);
+        assert!(
+            own_l2 <= l2 && own_display <= 0.95 * display,
+            "{filter:?}: {own_l2}, {own_display} with a specular colour"
+        );
         assert!(l2 <= 0.85 && display <= 0.80, "{filter:?}: L2 {l2}, display {display} of today's");
         let rusty = &gains[0];
         assert!(
@@ -270,7 +281,7 @@ fn sample_assets_of_mixed_metal_are_filtered_apart() {
 
         let gains: Vec<Gain> =
             pure.iter().map(|name| gain(&asset(&assets, name, Some(255)), filter)).collect();
-        let (l2, display) = means(filter, &gains);
+        let [[l2, display], _] = means(filter, &gains);
         assert!(l2 <= 1.0 && display <= 1.0, "{filter:?}: L2 {l2}, display {display} on pure metal");
         for Gain { name, l2, display } in &gains {
             assert!(l2[2] <= 1.15 && display[2] <= 1.15, "{filter:?}, {name}: {l2:?}, {display:?}");
@@ -300,7 +311,8 @@ fn of_maps(color: Arc<Image>, metallic: Arc<Image>) -> Reflectance {
 fn level_0_or_alpha_are_not_as_authored() {
     let size = (48, 20);
     let (color, metallic) = (noise(1, size, Channels::Rgba), noise(2, size, Channels::R));
-    let pair = base_and_metal(&of_maps(color.clone(), metallic.clone()), size, Kernel::Box, &untold).unwrap();
+    let pair =
+        base_and_metal(&of_maps(color.clone(), metallic.clone()), size, Kernel::Box, false, &untold).unwrap();
     let plain = plain_levels(&color, size, Transfer::Srgb, Kernel::Box, [Wrap::Repeat; 2], &untold).unwrap();
     let Pixels::U8(samples) = &metallic.pixels else { panic!("8 bits") };
     assert_eq!(pair.color[0], plain[0]);
@@ -323,8 +335,10 @@ fn levels_of_maps_of_other_sizes_stand_for_other_texels() {
         plain_levels(&small, (64, 32), Transfer::Srgb, Kernel::Box, wrap, &untold).unwrap().swap_remove(0);
     let rgb = enlarged.rgba8.chunks_exact(4).flat_map(|t| [t[0], t[1], t[2]]).collect();
     let enlarged = Arc::new(Image::new(64, 32, Channels::Rgb, Pixels::U8(rgb)).unwrap());
-    let one_size = base_and_metal(&of_maps(enlarged, large.clone()), (64, 32), Kernel::Box, &untold).unwrap();
-    let got = base_and_metal(&of_maps(small.clone(), large.clone()), (64, 32), Kernel::Box, &untold).unwrap();
+    let one_size =
+        base_and_metal(&of_maps(enlarged, large.clone()), (64, 32), Kernel::Box, false, &untold).unwrap();
+    let got = base_and_metal(&of_maps(small.clone(), large.clone()), (64, 32), Kernel::Box, false, &untold)
+        .unwrap();
     assert_eq!((got.color.len(), got.metallic.len()), (6, 7));
     let near = |got: &[u8], wanted: &[u8], what: &str| {
         let off = got.iter().zip(wanted).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
@@ -339,7 +353,7 @@ fn levels_of_maps_of_other_sizes_stand_for_other_texels() {
         near(&got.metallic[level], &one_size.metallic[level], &what);
     }
 
-    let apart = base_and_metal(&of_maps(small, large), (48, 32), Kernel::Box, &untold);
+    let apart = base_and_metal(&of_maps(small, large), (48, 32), Kernel::Box, false, &untold);
     assert_eq!(apart.unwrap_err(), Apart::Sizes(32, 16, 48, 32));
 }
 
@@ -353,7 +367,7 @@ fn materials_without_mixed_metal_take_another_way_than_today() {
             panic!("metallic")
         };
         change(base, metallic, dielectric);
-        base_and_metal(&reflectance, (16, 16), Kernel::Box, &untold).map(|_| ())
+        base_and_metal(&reflectance, (16, 16), Kernel::Box, false, &untold).map(|_| ())
     };
     assert_eq!(with(&|_, _, _| {}), Ok(()));
     for value in [0, 255] {
@@ -364,7 +378,10 @@ fn materials_without_mixed_metal_take_another_way_than_today() {
     assert_eq!(with(&|_, _, d| d.color.image = Some(color.clone())), Err(Apart::Dielectric));
     let specular = ReflectanceMaps::Specular(ColorMap { image: Some(color.clone()), factor: Vec3::ONE });
     let specular = Reflectance { maps: specular, wrap: [Wrap::Repeat; 2] };
-    assert_eq!(base_and_metal(&specular, (16, 16), Kernel::Box, &untold).unwrap_err(), Apart::Specular);
+    assert_eq!(
+        base_and_metal(&specular, (16, 16), Kernel::Box, false, &untold).unwrap_err(),
+        Apart::Specular
+    );
 }
 
 #[test]
@@ -373,7 +390,7 @@ fn pairs_depend_on_the_number_of_threads() {
     for kernel in [Kernel::Box, Kernel::Tent] {
         let [one, two, eight] = [1, 2, 8].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| base_and_metal(&reflectance, (70, 50), kernel, &untold).unwrap())
+            pool.install(|| base_and_metal(&reflectance, (70, 50), kernel, false, &untold).unwrap())
         });
         assert!(one == two && one == eight, "{kernel:?}");
     }

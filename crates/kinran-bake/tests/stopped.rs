@@ -129,7 +129,7 @@ fn a_stopped_pair_of_colour_and_metalness_is_chosen_on() {
     };
     let of_pair = |error: &Apart| matches!(error, Apart::Cancelled(_));
     assert_stops("pairs", texels(SIZE), of_pair, |tick| {
-        base_and_metal(&reflectance, SIZE, Kernel::Box, tick)
+        base_and_metal(&reflectance, SIZE, Kernel::Box, false, tick)
     });
 }
 

@@ -121,6 +121,12 @@ pub struct Args {
     #[arg(long)]
     pub all_textures: bool,
 
+    /// Of a glTF file whose textures are all baked, choose a specular colour together with base colour and metalness, so that
+    /// metal beside other material keeps both what it scatters and what it reflects: KHR_materials_specular with factors above
+    /// one, which some viewers do not know
+    #[arg(long)]
+    pub separate_specular: bool,
+
     /// Green grows upwards in normal maps (OpenGL, glTF), whatever their names and slopes say
     #[arg(long, conflicts_with = "y_down")]
     pub y_up: bool,
@@ -302,6 +308,7 @@ impl Args {
         (how.textures, how.green, how.source) = (self.textures(), self.green(), self.source());
         how.form = self.form.unwrap_or(how.form);
         (how.all_textures, how.estimate_normals) = (self.all_textures, self.curvature.estimate_normals);
+        how.separate_specular = self.separate_specular;
         how.allow_outside.clone_from(&self.model.allow_outside);
         (how.skin, how.curvature) = (self.curvature.skin.clone(), self.curvature.options());
         how

@@ -17,7 +17,7 @@ use crate::compare_sheet::{comparison_sheet, distance_sheet};
 use crate::model::{model_at, read_scene};
 use crate::picture::Picture;
 use crate::ranking::{Errors, FLIP_BEND, Order, order};
-use crate::surfaces::{Method, Mips, has_mixed, scene_surfaces};
+use crate::surfaces::{Colors, Method, Mips, has_mixed, scene_surfaces};
 use crate::table::table;
 use crate::values::{Choices, SWITCH, choice, counted, number};
 use crate::view::{Samples, View, ViewArgs, file_name, samples_of};
@@ -50,13 +50,13 @@ pub struct Args {
     #[arg(long, short, value_name = "DIR")]
     pub output: Option<PathBuf>,
 
-    /// Filters, in the order of the columns; ml-apart is ml with colour, metalness and lobe filtered each by itself, and so on
+    /// Filters, in the order of the columns; ml-apart is ml with colour, metalness and lobe filtered each by itself, ml-separate
+    /// is ml with a specular colour too, as bakes have it with --separate-specular, and so on
     #[arg(long, value_name = "A,B,C", value_delimiter = ',', default_value = "ml,linear,lean,naive",
         value_parser = method())]
     pub filters: Vec<Method>,
 
-    /// Where filters' pictures are shaded: once for a pixel, at its centre, samples telling what covers it, as games do it with
-    /// multisampling; or at every sample, which blurs textures a second time
+    /// Where filters' pictures are shaded; with pixel at its centre, samples telling what covers it
     #[arg(long, value_name = "WHERE", default_value = "pixel", value_parser = choice(SHADING))]
     pub shading: ShadingRate,
 
@@ -97,12 +97,17 @@ pub struct Args {
 }
 
 /// Where a pixel is shaded.
-const SHADING: &Choices<ShadingRate> =
-    &[(ShadingRate::Pixel, "pixel", ""), (ShadingRate::Sample, "sample", "")];
+const SHADING: &Choices<ShadingRate> = &[
+    (ShadingRate::Pixel, "pixel", "Once for a pixel, as games do it with multisampling"),
+    (ShadingRate::Sample, "sample", "At every sample, which blurs textures a second time"),
+];
 
-/// Takes a filter by its name, or by that with `-apart`.
+/// Takes a filter by its name, or by that with `-apart` or `-separate`.
 fn method() -> impl TypedValueParser<Value = Method> {
-    let all = || [true, false].into_iter().flat_map(|on| Filter::ALL.map(|filter| Method::new(filter, on)));
+    let all = || {
+        let colors = [Colors::Together, Colors::Apart, Colors::Separate].into_iter();
+        colors.flat_map(|colors| Filter::ALL.map(|filter| Method::of(filter, colors)))
+    };
     let names = distinct(&all().map(Method::name).collect::<Vec<_>>());
     PossibleValuesParser::new(names)
         .map(move |name| all().find(|method| method.name() == name).expect("only names pass"))
@@ -282,7 +287,9 @@ pub struct Comparison {
 impl Args {
     /// What the flags name, each once.
     fn methods(&self) -> Vec<Method> {
-        let switched = |method: &Method| Method::new(method.filter, method.correlated && self.correlated);
+        let switched = |method: &Method| {
+            Method::of(method.filter, if self.correlated { method.colors } else { Colors::Apart })
+        };
         distinct(&self.filters.iter().map(switched).collect::<Vec<_>>())
     }
 }
@@ -646,15 +653,14 @@ impl Steps<'_> {
         // Noise is taken off: fewer samples than those of ground truth will do.
         let few: Vec<u32> = truth.iter().map(|taken| taken.of_half.div_ceil(8)).collect();
         let kernel = self.errors(prepared, Mips::Level0, texels(false), &few, truth)?;
-        let mut colors: Vec<(bool, Vec<[f64; 2]>)> = Vec::new();
+        let mut colors: Vec<(Colors, Vec<[f64; 2]>)> = Vec::new();
         let mut budgets = Vec::new();
         for (method, (drawn, measured)) in self.methods.iter().zip(drawn.iter().zip(measured)) {
-            let correlated = method.correlated;
-            if colors.iter().all(|(of, _)| *of != correlated) {
-                let mips = Mips::Colors { correlated };
-                colors.push((correlated, self.errors(prepared, mips, texels(true), &few, truth)?));
+            if colors.iter().all(|(of, _)| *of != method.colors) {
+                let mips = Mips::Colors(method.colors);
+                colors.push((method.colors, self.errors(prepared, mips, texels(true), &few, truth)?));
             }
-            let colors = colors.iter().find(|(of, _)| *of == correlated).map(|(_, errors)| errors);
+            let colors = colors.iter().find(|(of, _)| *of == method.colors).map(|(_, errors)| errors);
             let samples: Vec<u32> = drawn.iter().map(|taken| taken.of_half).collect();
             let mips = Mips::Uncompressed(*method);
             let float = self.errors(prepared, mips, self.options.filtering(), &samples, truth)?;

@@ -58,6 +58,7 @@ fn description(name: &str) -> &'static str {
         "param" => "SGGX parameters",
         "lean" => "LEAN mapping",
         apart if apart.ends_with("-apart") => "the same, maps one by one",
+        separate if separate.ends_with("-separate") => "the same, specular colour too",
         _ => "maps averaged as colours",
     }
 }

@@ -22,7 +22,7 @@ use serde::Serialize;
 
 use crate::compare::{self, Finding, MethodReport, compare};
 use crate::picture::Picture;
-use crate::surfaces::{Method, Mips, scene_surfaces};
+use crate::surfaces::{Colors, Method, Mips, scene_surfaces};
 use crate::view::{View, ViewArgs, file_name, samples_of};
 use crate::{Console, Error, Progress, bake, outputs};
 use scenes::Subject;
@@ -108,11 +108,11 @@ impl Scale {
 
 /// What is compared; the second is drawn where it differs from the first.
 const METHODS: [Method; 5] = [
-    Method { filter: Filter::Ml, correlated: true },
-    Method { filter: Filter::Ml, correlated: false },
-    Method { filter: Filter::Linear, correlated: true },
-    Method { filter: Filter::Lean, correlated: true },
-    Method { filter: Filter::Naive, correlated: false },
+    Method { filter: Filter::Ml, colors: Colors::Together },
+    Method { filter: Filter::Ml, colors: Colors::Apart },
+    Method { filter: Filter::Linear, colors: Colors::Together },
+    Method { filter: Filter::Lean, colors: Colors::Together },
+    Method { filter: Filter::Naive, colors: Colors::Apart },
 ];
 
 /// What the demo made of one material. Paths are relative to the output folder.

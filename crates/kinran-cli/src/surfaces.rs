@@ -12,12 +12,12 @@ use kinran_bake::aniso::{
     SurfaceOptions, TexelSpan, Weights, bake_surface,
 };
 use kinran_bake::fuzz_fit::{FuzzFit, Phase, ambient_texels, fuzz_fit};
-use kinran_bake::metal::BaseAndMetal;
-use kinran_bake::{MaterialSurface, NoSurface, material_reflectance, material_surface};
+use kinran_bake::metal::{BaseAndMetal, specular_white};
+use kinran_bake::{MaterialSurface, NoSurface, Rgba8Level, material_reflectance, material_surface};
 use kinran_image::{Cancelled, Format, Level, Role, Texture, Transfer, full_level_count, level_size};
 use kinran_render::reference::{
     AnisoEncoding, BoundTexture, ColorTextures, FUZZ_TILTS, FuzzCoefficients, FuzzFits, MipLevel, MipTexture,
-    SurfaceTextures,
+    RenderDielectric, SurfaceTextures,
 };
 use kinran_scene::{FuzzPhase, Material, Scene, TextureRef};
 use kinran_shading::fuzz::{FUZZ_COMBED_ALPHA, fuzz_alpha};
@@ -26,32 +26,54 @@ use rayon::prelude::*;
 use crate::progress::Bars;
 use crate::{Error, Progress};
 
+/// How colour, metalness and lobe of a surface are filtered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Colors {
+    /// Each map by itself.
+    Apart,
+    /// Together, where they can be.
+    Together,
+    /// Together, and with a specular colour, as `--separate-specular` has it.
+    Separate,
+}
+
 /// A way to make mips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Method {
     /// How a footprint becomes one texel.
     pub filter: Filter,
-    /// Whether colour, metalness and lobe are filtered together, where they can be.
-    pub correlated: bool,
+    /// How colours go with it.
+    pub colors: Colors,
 }
 
 impl Method {
     /// As a bake has it: a filter that knows nothing of metal takes each map by itself.
     pub fn new(filter: Filter, correlated: bool) -> Self {
-        let mut options = TextureOptions::default();
-        (options.filter, options.correlated) = (filter, correlated);
-        Method { filter, correlated: options.is_correlated() }
+        Method::of(filter, if correlated { Colors::Together } else { Colors::Apart })
     }
 
-    /// The filter's name; with `-apart` where it would filter colour, metalness and lobe together, and does not.
+    /// As [`Self::new`].
+    pub fn of(filter: Filter, colors: Colors) -> Self {
+        let mut options = TextureOptions::default();
+        (options.filter, options.correlated) = (filter, colors != Colors::Apart);
+        Method { filter, colors: if options.is_correlated() { colors } else { Colors::Apart } }
+    }
+
+    /// The filter's name; with `-apart` where it would filter colour, metalness and lobe together, and does not, and with
+    /// `-separate` where there is a specular colour too.
     pub fn name(self) -> &'static str {
-        match (self.filter, self.correlated) {
-            (filter @ Filter::Naive, _) | (filter, true) => filter.name(),
-            (Filter::Ml, false) => "ml-apart",
-            (Filter::Dpd, false) => "dpd-apart",
-            (Filter::Linear, false) => "linear-apart",
-            (Filter::Param, false) => "param-apart",
-            (Filter::Lean, false) => "lean-apart",
+        let [together, apart, separate] = match self.filter {
+            Filter::Ml => ["ml", "ml-apart", "ml-separate"],
+            Filter::Dpd => ["dpd", "dpd-apart", "dpd-separate"],
+            Filter::Linear => ["linear", "linear-apart", "linear-separate"],
+            Filter::Param => ["param", "param-apart", "param-separate"],
+            Filter::Lean => ["lean", "lean-apart", "lean-separate"],
+            Filter::Naive => ["naive"; 3],
+        };
+        match self.colors {
+            Colors::Together => together,
+            Colors::Apart => apart,
+            Colors::Separate => separate,
         }
     }
 }
@@ -65,10 +87,7 @@ pub enum Mips {
     Uncompressed(Method),
     /// Level 0 of normals and lobes, in floats, with what texels count in a filter as alpha of the normals; colours as they are
     /// filtered with the lobes, or by themselves.
-    Colors {
-        /// Whether they are filtered together.
-        correlated: bool,
-    },
+    Colors(Colors),
     /// Level 0 alone, in floats: ground truth.
     Level0,
     /// The mip chains that came with the model in KTX2 or DDS files, as they are; materials without any as
@@ -78,13 +97,13 @@ pub enum Mips {
 
 impl Mips {
     /// What a bake makes that is not told how.
-    pub const DEFAULT: Mips = Mips::Filtered(Method { filter: Filter::Ml, correlated: true });
+    pub const DEFAULT: Mips = Mips::Filtered(Method { filter: Filter::Ml, colors: Colors::Together });
 
     /// The method's name, `baked`, or `truth`.
     pub fn name(self) -> &'static str {
         match self {
             Mips::Filtered(method) | Mips::Uncompressed(method) => method.name(),
-            Mips::Colors { .. } => "colours",
+            Mips::Colors(_) => "colours",
             Mips::Level0 => "truth",
             Mips::Baked => "baked",
         }
@@ -96,11 +115,11 @@ impl Mips {
         if baked { Mips::Baked } else { Mips::DEFAULT }
     }
 
-    fn is_correlated(self) -> bool {
+    fn colors(self) -> Colors {
         match self {
-            Mips::Filtered(method) | Mips::Uncompressed(method) => method.correlated,
-            Mips::Colors { correlated } => correlated,
-            Mips::Level0 | Mips::Baked => false,
+            Mips::Filtered(method) | Mips::Uncompressed(method) => method.colors,
+            Mips::Colors(colors) => colors,
+            Mips::Level0 | Mips::Baked => Colors::Apart,
         }
     }
 
@@ -163,10 +182,11 @@ fn filtered_together(
     warnings: &mut Vec<String>,
     progress: &Progress,
 ) -> Result<Together, Error> {
-    if !mips.is_correlated() {
+    if mips.colors() == Colors::Apart {
         return Ok(Together { maps: surface.maps.clone(), pair: None });
     }
-    let name = &scene.materials[material].name;
+    let Material { name, dielectric, .. } = &scene.materials[material];
+    let separate = mips.colors() == Colors::Separate && dielectric.is_none();
     let reflectance = material_reflectance(scene, material, surface).unwrap_or_else(|reason| {
         warnings.push(reason);
         None
@@ -177,7 +197,7 @@ fn filtered_together(
     let apart = |of: &Reflectance| why_apart(&format!("material \"{name}\""), of, &maps);
     warnings.extend(reflectance.as_ref().and_then(apart));
     let (kernel, bars) = (SurfaceOptions::default().kernel, Bars::new(progress.clone()));
-    Ok(together(&maps, reflectance.as_ref(), None, name, kernel, bars.task())?)
+    Ok(together(&maps, reflectance.as_ref(), None, separate, name, kernel, bars.task())?)
 }
 
 /// Whether any material's maps are filtered together: what it reflects differs from texel to texel.
@@ -191,15 +211,18 @@ pub(crate) fn has_mixed(scene: &Scene) -> bool {
     })
 }
 
-/// Base colour and metalness as textures, in 8 bits.
+/// Base colour, metalness and specular colour as textures, in 8 bits.
 fn colors(pair: BaseAndMetal, surface: &MaterialSurface) -> Result<ColorTextures, Error> {
-    let levels = pair.color.into_iter();
-    let levels = levels.map(|level| Level { width: level.width, height: level.height, data: level.rgba8 });
-    let base_color = Texture {
-        format: Format::Rgba8,
-        transfer: Transfer::Srgb,
-        levels: levels.collect(),
-        metadata: BTreeMap::new(),
+    let place = surface.place.as_ref();
+    let color = |levels: Vec<Rgba8Level>| -> Result<BoundTexture, Error> {
+        let level = |level: Rgba8Level| Level { width: level.width, height: level.height, data: level.rgba8 };
+        let texture = Texture {
+            format: Format::Rgba8,
+            transfer: Transfer::Srgb,
+            levels: levels.into_iter().map(level).collect(),
+            metadata: BTreeMap::new(),
+        };
+        Ok(bind(Arc::new(MipTexture::from_texture(&texture, surface.maps.wrap)?), place))
     };
     let ((width, height), wrap) = (surface.maps.size(), surface.maps.wrap);
     let levels = (0..).zip(pair.metallic).map(|(level, metallic)| MipLevel {
@@ -208,10 +231,13 @@ fn colors(pair: BaseAndMetal, surface: &MaterialSurface) -> Result<ColorTextures
         texels: metallic.into_iter().map(|m| [1.0, 1.0, f32::from(m) / 255.0, 1.0]).collect(),
     });
     let metallic = MipTexture { levels: levels.collect(), wrap, encoded: None };
-    let place = surface.place.as_ref();
+    let dielectric =
+        |map| RenderDielectric { f0: Vec3::splat(specular_white()), strength: 1.0, map: Some(map) };
+    let specular = Some(pair.specular).filter(|levels| !levels.is_empty());
     Ok(ColorTextures {
-        base_color: bind(Arc::new(MipTexture::from_texture(&base_color, wrap)?), place),
+        base_color: color(pair.color)?,
         metallic: bind(Arc::new(metallic), place),
+        dielectric: specular.map(color).transpose()?.map(dielectric),
     })
 }
 

@@ -270,6 +270,55 @@ fn a_baked_model_means_something_else() {
     assert_eq!(said.code, Some(0), "{}", said.err);
 }
 
+/// Half bright metal, half dull paint, texel by texel, from so far away that a pixel shows many of both: the file with a
+/// specular colour, drawn from its own mips, beside the authored maps in many samples.
+#[test]
+fn a_specular_colour_is_not_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = anisotropic_model(folder.path());
+    let mut document: Value = serde_json::from_slice(&std::fs::read(&model).unwrap()).unwrap();
+    document["materials"] = json!([{ "normalTexture": { "index": 0, "scale": 0.2 },
+        "pbrMetallicRoughness": { "baseColorTexture": { "index": 2 }, "metallicRoughnessTexture": { "index": 1 } } }]);
+    document["textures"].as_array_mut().unwrap().push(json!({ "source": 2, "sampler": 0 }));
+    document["images"].as_array_mut().unwrap().push(json!({ "uri": "paint.png" }));
+    document["extensionsUsed"] = json!([]);
+    std::fs::write(&model, document.to_string()).unwrap();
+    let is_metal = |x: u32, y: u32| (x / 2 + y / 2).is_multiple_of(2);
+    let orm = |x: u32, y: u32| [255, 150, if is_metal(x, y) { 255 } else { 0 }, 255];
+    write(folder.path(), "orm.png", &image(32, Channels::Rgb, orm));
+    let paint = |x: u32, y: u32| if is_metal(x, y) { [215, 214, 210, 255] } else { [170, 30, 20, 255] };
+    write(folder.path(), "paint.png", &image(32, Channels::Rgb, paint));
+
+    let picture = |model: &Path, name: &str, more: &[&str]| -> Vec<f32> {
+        let output = folder.path().join(name).with_extension("exr");
+        let words = ["--quiet", "render", text(model), "-o", text(&output), "--size", "8x8", "--env", "none"];
+        let said = kinran(&[&words[..], &["--light", "0.3,0.2,1", "--light", "-1,0.5,0.4"], more].concat());
+        assert_eq!(said.code, Some(0), "{more:?}: {}", said.err);
+        let Pixels::F32(samples) = read_image(&output).unwrap().pixels else { panic!("an EXR of floats") };
+        samples
+    };
+    let truth = picture(&model, "truth", &["--filter", "none", "--spp", "1024"]);
+    let norm: f32 = truth.iter().map(|v| v * v).sum();
+    let mut errors = Vec::new();
+    for (name, flag) in
+        [("apart", "--correlated=off"), ("pair", "--force"), ("separate", "--separate-specular")]
+    {
+        let out = folder.path().join(name);
+        let said = kinran(&["bake", text(&model), "-o", text(&out), "--all-textures", flag]);
+        assert_eq!(said.code, Some(0), "{flag}: {}", said.err);
+        let baked = out.join("square.gltf");
+        for backend in ["cpu", "gpu"] {
+            let more = ["--backend", backend, "--spp", "64", "--no-shadows"];
+            let drawn = picture(&baked, &format!("{name}_{backend}"), &more);
+            let square: f32 = truth.iter().zip(&drawn).map(|(a, b)| (a - b) * (a - b)).sum();
+            println!("{name}, {backend}: relative L2 {:.4}", (square / norm).sqrt());
+            errors.push((square / norm).sqrt());
+        }
+    }
+    let [_, _, pair_cpu, pair_gpu, separate_cpu, separate_gpu] = errors[..] else { panic!("six pictures") };
+    assert!(separate_cpu < 0.8 * pair_cpu && separate_gpu < 0.8 * pair_gpu, "{errors:?}");
+}
+
 #[test]
 fn a_binary_model_loses_its_mesh() {
     let (_folder, model) = square();

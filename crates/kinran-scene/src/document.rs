@@ -36,6 +36,8 @@ pub enum Slot {
     Emissive,
     /// `anisotropyTexture` of `KHR_materials_anisotropy`.
     Anisotropy,
+    /// `specularColorTexture` of `KHR_materials_specular`.
+    SpecularColor,
     /// `clearcoatNormalTexture` of `KHR_materials_clearcoat`.
     ClearcoatNormal,
     /// `anisoTexture` of `KINRAN_materials_aniso`.
@@ -52,6 +54,7 @@ impl Slot {
             Slot::Occlusion => (&[], "occlusionTexture"),
             Slot::Emissive => (&[], "emissiveTexture"),
             Slot::Anisotropy => (&["extensions", "KHR_materials_anisotropy"], "anisotropyTexture"),
+            Slot::SpecularColor => (&["extensions", "KHR_materials_specular"], "specularColorTexture"),
             Slot::ClearcoatNormal => (&["extensions", "KHR_materials_clearcoat"], "clearcoatNormalTexture"),
             Slot::Aniso => (&["extensions", "KINRAN_materials_aniso"], "anisoTexture"),
         }

@@ -153,7 +153,8 @@ impl Findings {
             self.add(place, format!("{format} has too few channels for {content}, which needs {channels}"));
             return;
         }
-        let is_color = content == Content::Color && texture.format.has_srgb();
+        let is_color =
+            matches!(content, Content::Color | Content::SpecularColor) && texture.format.has_srgb();
         if texture.transfer == Transfer::Srgb && !is_color && !is_table && !blended(content) {
             self.add(place, format!("{} is marked as sRGB; it is linear", content.name()));
         }
@@ -201,7 +202,7 @@ impl Findings {
             self.add(&name, error.to_string());
         }
         self.extensions(&name, document.json());
-        let slots: [(Slot, &str, &[Content]); 8] = [
+        let slots: [(Slot, &str, &[Content]); 9] = [
             (Slot::Normal, "normalTexture", &[Content::Normal]),
             (Slot::MetallicRoughness, "metallicRoughnessTexture", &[Content::Roughness, Content::Orm]),
             (Slot::Anisotropy, "anisotropyTexture", &[Content::Anisotropy]),
@@ -209,6 +210,7 @@ impl Findings {
             (Slot::BaseColor, "baseColorTexture", &[Content::Color]),
             (Slot::Emissive, "emissiveTexture", &[Content::Color]),
             (Slot::Occlusion, "occlusionTexture", &[Content::Data, Content::Orm, Content::Roughness]),
+            (Slot::SpecularColor, "specularColorTexture", &[Content::SpecularColor, Content::Color]),
             (Slot::ClearcoatNormal, "clearcoatNormalTexture", &[Content::Normal]),
         ];
         for material in 0..document.material_count() {
@@ -268,7 +270,7 @@ impl Findings {
         };
         let plain = texture.get("source").and_then(Value::as_u64);
         let plain = plain.and_then(|image| Some((image, document.image_bytes(image as usize).ok()?)));
-        for extension in [TextureExtension::Ktx2, TextureExtension::Dds] {
+        for (extension, end) in [(TextureExtension::Ktx2, "ktx2"), (TextureExtension::Dds, "dds")] {
             let extension = extension.name();
             let source = texture.get("extensions").and_then(|e| e.get(extension)?.get("source")?.as_u64());
             let Some(image) = source.map(|source| source as usize) else { continue };
@@ -280,7 +282,12 @@ impl Findings {
                     continue;
                 }
             };
-            let path = document.path().with_file_name(document.image_name(image));
+            // Names of images are without the end of their file, which an image in a buffer has none of.
+            let images = document.json().get("images").and_then(|images| images.get(image));
+            let uri =
+                images.and_then(|image| image.get("uri")?.as_str()).filter(|uri| !uri.starts_with("data:"));
+            let end = uri.and_then(|uri| uri.rsplit_once('.')).map_or(end, |(_, end)| end);
+            let path = document.path().with_file_name(format!("{}.{end}", document.image_name(image)));
             let Some(texture) = self.texture_file(&place, &path, &bytes, Some(wanted)) else { continue };
             let size = (texture.levels[0].width, texture.levels[0].height);
             if let Some((fallback, bytes)) = &plain

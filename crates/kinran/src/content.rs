@@ -22,6 +22,8 @@ pub enum Content {
     Orm,
     /// Colour.
     Color,
+    /// `KHR_materials_specular`: colour of what reflects that is not metal.
+    SpecularColor,
     /// Masks.
     Data,
     /// The map that turns tiles into their target.
@@ -43,13 +45,14 @@ impl Content {
     pub const KEY: &str = "KinranMap";
 
     /// All of them.
-    pub const ALL: [Content; 13] = [
+    pub const ALL: [Content; 14] = [
         Content::Normal,
         Content::Aniso,
         Content::Roughness,
         Content::Anisotropy,
         Content::Orm,
         Content::Color,
+        Content::SpecularColor,
         Content::Data,
         Content::Synthesized,
         Content::Detail,
@@ -68,6 +71,7 @@ impl Content {
             Content::Anisotropy => "anisotropy",
             Content::Orm => "orm",
             Content::Color => "color",
+            Content::SpecularColor => "specular-color",
             Content::Data => "data",
             Content::Synthesized => "synthesized",
             Content::Detail => "detail",

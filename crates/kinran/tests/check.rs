@@ -42,7 +42,7 @@ fn baked_model_of_two_sizes() -> Memory {
 fn baked_model_of(model: Vec<(&'static str, Vec<u8>)>) -> Memory {
     let mut how = GltfOptions::default();
     (how.all_textures, how.estimate_normals, how.curvature.of) = (true, true, Which::All);
-    how.form = Form::Both;
+    (how.form, how.separate_specular) = (Form::Both, true);
     how.textures.encoder = Some(Encoder::Portable);
     let (files, out) = (model.into_iter().collect::<Memory>(), Memory::new());
     gltf(&files, Path::new("models/drum.gltf"), &how, &out, Task::QUIET).unwrap();

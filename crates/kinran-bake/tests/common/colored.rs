@@ -11,17 +11,21 @@ pub struct Colored {
     /// Linear.
     pub base: Vec3,
     pub metallic: f32,
+    /// F0 of what is not metal; 0.04 without `KHR_materials_specular`.
+    pub specular: Vec3,
 }
 
 impl Colored {
     /// Radiance times the cosine of a light along `u`, seen along `v`: Lambert, and GGX with Schlick's Fresnel term.
     pub fn shade(&self, u: Vec3, v: Vec3) -> Vec3 {
         let (n, m) = (self.surface.0, self.metallic);
-        let f0 = Vec3::splat(0.04 * (1.0 - m)) + self.base * m;
+        let f0 = self.specular * (1.0 - m) + self.base * m;
         let h = (u + v).normalize();
         let grazing = (1.0 - v.dot(h).clamp(0.0, 1.0)).powi(5);
         let fresnel = f0 + (Vec3::ONE - f0) * grazing;
-        let diffuse = self.base * (1.0 - m) / std::f32::consts::PI * n.dot(u).max(0.0);
+        // What is not metal scatters what it does not reflect, here relative to 0.96.
+        let inside = (1.0 - self.specular.max_element()) / 0.96;
+        let diffuse = self.base * ((1.0 - m) * inside) / std::f32::consts::PI * n.dot(u).max(0.0);
         diffuse + fresnel * lobe(self.surface, u, v)
     }
 }

@@ -41,7 +41,7 @@ const fn flag(name: &'static str, on: On, given: fn(&Args) -> bool) -> Flag {
 }
 
 /// Every flag, in the order of `kinran bake --help`.
-pub(super) const FLAGS: [Flag; 43] = [
+pub(super) const FLAGS: [Flag; 44] = [
     flag("output", On::Run, |a| a.output.is_some()),
     flag("filter", On::Any, |a| a.filter.name() != "ml"),
     flag("kernel", On::Any, |a| a.kernel != Kernel::default()),
@@ -57,6 +57,7 @@ pub(super) const FLAGS: [Flag; 43] = [
     flag("encoder", On::Any, |a| a.encoder.is_some()),
     flag("preset", On::Any, |a| a.preset.is_some()),
     flag("all-textures", On::Model, |a| a.all_textures),
+    flag("separate-specular", On::Model, |a| a.separate_specular),
     flag("y-up", On::Any, |a| a.y_up),
     flag("y-down", On::Any, |a| a.y_down),
     flag("direction-span", On::Folder, |a| a.direction_span.is_some()),

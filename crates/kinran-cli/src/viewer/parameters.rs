@@ -16,7 +16,7 @@ use super::detail::DetailParameters;
 use super::fuzz::FuzzParameters;
 use super::orbit::Orbit;
 use crate::Error;
-use crate::surfaces::{Method, Mips};
+use crate::surfaces::{Colors, Method, Mips};
 use crate::view::{Curve, EnvironmentChoice, ViewArgs};
 
 /// Names and meanings of what can be shown of a surface.
@@ -40,7 +40,8 @@ pub(super) const CURVATURES: [(&str, SkinCurvature); 4] = [
 ];
 
 const fn filtered(filter: Filter) -> Mips {
-    Mips::Filtered(Method { filter, correlated: !matches!(filter, Filter::Naive) })
+    let colors = if matches!(filter, Filter::Naive) { Colors::Apart } else { Colors::Together };
+    Mips::Filtered(Method { filter, colors })
 }
 
 /// Names and meanings of the ways to filter. New ones come last: saved parameters hold places in this list.

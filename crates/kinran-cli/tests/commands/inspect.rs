@@ -138,10 +138,22 @@ fn a_file_that_kinran_writes_is_refused_by_inspect() {
     let upper = format!("--layer={},scale=3,mask={}", file("a_ao.png"), file("mask.png"));
     let normals = format!("--layer={},scale=2", file("a_nor_gl.png"));
     let table = text(&folder.path().join("combed.exr")).to_owned();
-    let runs: [&[&str]; 8] = [
+    // Metal beside other material.
+    let mixed = folder.path().join("mixed.gltf");
+    let document = serde_json::json!({
+        "asset": { "version": "2.0" },
+        "materials": [{ "name": "paint", "normalTexture": { "index": 0 }, "pbrMetallicRoughness":
+            { "baseColorTexture": { "index": 0 }, "metallicRoughnessTexture": { "index": 0 } } }],
+        "textures": [{ "source": 0 }],
+        "images": [{ "uri": "mixed.png" }]
+    });
+    std::fs::write(&mixed, document.to_string()).unwrap();
+    std::fs::write(folder.path().join("mixed.png"), kinran_image::encode_png(&bumps()).unwrap()).unwrap();
+    let runs: [&[&str]; 9] = [
         &["bake", text(maps.path()), "--form", "both", "--container", "both", "--ignore", "mask.png"],
         &["bake", text(&model), "--all-textures", "--curvature", "all", "--curvature-dump", "json"],
         &["bake", text(&model), "--form", "aniso", "--curvature", "all", "--curvature-dump", "exr"],
+        &["bake", text(&mixed), "--all-textures", "--separate-specular"],
         &["skin-lut", "--penumbra", "--size", "8x8", "--container", "both"],
         &["detail", "solve", &file("a_color.png"), &lower, &upper, "--board", "--pictures"],
         &["detail", "solve", &file("a_nor_gl.png"), "--kind", "normal", &normals],

@@ -127,6 +127,12 @@ fn a_flag_for_colours_that_are_not_baked_is_swallowed() {
             assert!(!said.err.contains("nothing to act on"), "{words:?} --all-textures: {}", said.err);
         }
     }
+    for more in ["--filter=linear", "--dry-run"] {
+        let words = ["bake", text(&model), "-o", text(&out), "--separate-specular", more];
+        let said = kinran(&words);
+        let wanted = "--separate-specular has nothing to act on: no colour is baked; --all-textures";
+        assert!(said.code == Some(0) && said.err.matches(wanted).count() == 1, "{words:?}: {}", said.err);
+    }
     for wrong in ["1.5", "-0.1", "nan", "half"] {
         let given = format!("--alpha-coverage={wrong}");
         refused(&["bake", text(&model), "-o", text(&out), &given], &["--alpha-coverage", "0 to 1"]);

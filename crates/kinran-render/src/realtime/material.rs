@@ -82,7 +82,7 @@ pub(super) struct Material {
 
 /// Textures of a material, `white` where it has none.
 fn slots<'a>(m: &'a RenderMaterial, white: &'a BoundTexture) -> [&'a BoundTexture; SLOTS] {
-    let (translucency, dielectric) = (m.translucency.as_ref(), m.dielectric.as_ref());
+    let (translucency, dielectric) = (m.translucency.as_ref(), m.drawn_dielectric());
     [
         m.surface.as_ref().map_or(white, |s| &s.normal),
         m.surface.as_ref().map_or(white, |s| &s.aniso),
@@ -110,7 +110,7 @@ fn uniform(m: &RenderMaterial, adjustment: Adjustment, curvature_range: f32) -> 
     let Adjustment { roughness, anisotropy, rotation, normal_scale } = adjustment;
     let [skin, skin_gloss, skin_shadow] = skin(m, curvature_range);
     let default = Vec3::splat(DIELECTRIC_F0).extend(1.0);
-    let dielectric = m.dielectric.as_ref().map_or(default, |d| d.f0.extend(d.strength));
+    let dielectric = m.drawn_dielectric().map_or(default, |d| d.f0.extend(d.strength));
     Material {
         base_color: m.base_color_factor.into(),
         emissive: m.emissive_factor.extend(m.occlusion_strength).into(),

@@ -38,6 +38,8 @@ pub struct ColorTextures {
     pub base_color: BoundTexture,
     /// B metallic.
     pub metallic: BoundTexture,
+    /// What reflects that is not metal, where that was filtered with them too.
+    pub dielectric: Option<RenderDielectric>,
 }
 
 impl SurfaceTextures {
@@ -141,6 +143,11 @@ impl RenderMaterial {
     /// The same for metalness.
     pub(crate) fn drawn_metallic_roughness(&self) -> Option<&BoundTexture> {
         self.surface_colors().map(|colors| &colors.metallic).or(self.metallic_roughness.as_ref())
+    }
+
+    /// The same for what reflects that is not metal.
+    pub(crate) fn drawn_dielectric(&self) -> Option<&RenderDielectric> {
+        self.surface_colors().and_then(|colors| colors.dielectric.as_ref()).or(self.dielectric.as_ref())
     }
 }
 

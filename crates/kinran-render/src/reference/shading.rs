@@ -63,7 +63,7 @@ fn base_color(material: &RenderMaterial, point: &SurfacePoint, filtering: Textur
 
 /// Reflectance at normal incidence of what is not metal, and the share that there is of it.
 fn dielectric(material: &RenderMaterial, point: &SurfacePoint, filtering: TextureFiltering) -> (Vec3, f32) {
-    let Some(dielectric) = &material.dielectric else { return (Vec3::splat(DIELECTRIC_F0), 1.0) };
+    let Some(dielectric) = material.drawn_dielectric() else { return (Vec3::splat(DIELECTRIC_F0), 1.0) };
     let map = sample(dielectric.map.as_ref(), point, filtering);
     let (f0, strength) = (dielectric.f0 * map.xyz(), dielectric.strength * map.w);
     (f0.clamp(Vec3::ZERO, Vec3::ONE), strength.clamp(0.0, 1.0))

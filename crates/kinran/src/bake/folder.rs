@@ -6,6 +6,7 @@ use kinran_bake::aniso::{Sheet, SheetRequest, bake_surface_and_metal};
 use kinran_bake::folder::{
     ASSUMED_ROUGHNESS, Folder, Hints, LoadedMap, LoadedMaterial, MaterialMaps, Role as MapRole, scan_in,
 };
+use kinran_bake::metal::BaseAndMetal;
 use kinran_bake::{bake_cutout, bake_plain, pack_channels};
 use kinran_image::{Encoding, Files, Image, Role, Transfer};
 use rayon::prelude::*;
@@ -201,9 +202,11 @@ fn bake_material(
         warnings.extend(apart);
         let cutoff = how.textures.alpha_coverage.of_folder();
         let kernel = how.textures.kernel;
-        let together = together(maps, reflectance.as_ref(), cutoff, &name, kernel, task)?;
+        let together = together(maps, reflectance.as_ref(), cutoff, false, &name, kernel, task)?;
         let pair = together.pair.as_ref();
-        chosen = pair.map(|pair| color_texture(pair, &name, &how.textures, task)).transpose()?;
+        let color =
+            |pair: &BaseAndMetal| color_texture(&pair.color, Content::Color, &name, &how.textures, task);
+        chosen = pair.map(color).transpose()?;
         let (maps, metallic_levels) = (&together.maps, pair.map_or(&[][..], |pair| &pair.metallic));
         let size = maps.size();
         // One image that holds occlusion and metalness where glTF wants them is packed as it is.

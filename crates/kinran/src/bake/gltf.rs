@@ -8,10 +8,11 @@ use kinran_bake::aniso::{Reflectance, RoughnessMaps, Sheet, SheetRequest, bake_s
 use kinran_bake::folder::{
     Green, GreenGuess, below_surface, guess_green, not_normals, odd_lengths, outside_unit,
 };
-use kinran_bake::metal::apart;
+use kinran_bake::metal::{apart, specular_size, specular_white};
 use kinran_bake::{
     MaterialSurface, NoSurface, bake_cutout, bake_plain, material_reflectance, material_surface,
 };
+use kinran_image::srgb::byte_from_linear;
 use kinran_image::{
     Channels, Encoder, Encoding, Files, Format, Image, Memory, Pixels, Preset, Role, Texture, Transfer,
     decode_image, encode_png, image_size_of,
@@ -19,6 +20,7 @@ use kinran_image::{
 use kinran_scene::{
     Dielectric, Document, FUZZ_EXTENSION, Maps, Material, Needs, Scene, Slot, TextureExtension, TextureRef,
 };
+use kinran_shading::DIELECTRIC_F0;
 use serde_json::Value;
 
 use super::gltf_options::GltfOptions;
@@ -55,6 +57,8 @@ pub struct Surface {
     pub maps: MaterialSurface,
     /// What they reflect, where that differs from texel to texel and their base colours are baked too.
     pub reflectance: Option<Reflectance>,
+    /// Size of the specular colour that is chosen for them, where one is.
+    specular: Option<(u32, u32)>,
     key: Key,
 }
 
@@ -427,7 +431,11 @@ pub fn gltf_space(files: &dyn Files, input: &Path, how: &GltfOptions) -> Result<
             let image = image(material, slot).filter(|image| maps[2] != Some(*image));
             if let Some(size) = image.filter(|&image| plain.insert(image)).as_ref().and_then(size) {
                 let role = if slot == Slot::Occlusion { Role::Data } else { Role::Color };
-                space.add(options.space(options.encoding(role, options.color_format).format, size));
+                let texture = options.space(options.encoding(role, options.color_format).format, size);
+                space.add(texture);
+                if slot == Slot::BaseColor && how.separate_specular {
+                    space.most += texture.most;
+                }
             }
         }
     }
@@ -464,6 +472,12 @@ fn check(
         }
         space.most += replaced.len() as u64 * 3 * u64::from(size.0) * u64::from(size.1);
         names.extend(replaced.into_iter().map(|name| format!("{name}.png")));
+        if let Some(size) = surface.specular {
+            let name = format!("{name}_{}", Content::SpecularColor.name());
+            names.extend(options.files(&name));
+            names.push(format!("{name}.png"));
+            space.add(options.space(options.encoding(Role::Color, options.color_format).format, size));
+        }
     }
     for color in &plan.colors {
         names.extend(options.files(&color.name));
@@ -562,13 +576,30 @@ fn surfaces(
                 }
                 // A base colour that stays as it is gets its levels from the viewer.
                 reflectance = reflectance.filter(|_| how.all_textures && maps.maps.weights.is_some());
+                let mut specular = None;
                 if let Some(reflectance) = &reflectance {
-                    let name = format!("material \"{}\"", scene.materials[material].name);
+                    let m = &scene.materials[material];
+                    let name = format!("material \"{}\"", m.name);
                     warnings.extend(why_apart(&name, reflectance, &maps.maps));
+                    specular = specular_size(reflectance, size).filter(|_| how.separate_specular);
+                    if specular.is_some() && m.dielectric.is_some() {
+                        warnings.push(format!(
+                            "{name}: no specular colour is chosen for it, since KHR_materials_specular or KHR_materials_ior says what reflects"
+                        ));
+                        specular = None;
+                    }
                 }
                 match surfaces.iter_mut().find(|known| known.key == key) {
                     Some(known) => known.materials.push(material),
-                    None => surfaces.push(Surface { materials: vec![material], maps, reflectance, key }),
+                    None => {
+                        surfaces.push(Surface {
+                            materials: vec![material],
+                            maps,
+                            reflectance,
+                            specular,
+                            key,
+                        });
+                    }
                 }
             }
             Err(NoSurface::Plain) => {}
@@ -577,6 +608,16 @@ fn surfaces(
                 apart = true;
             }
         }
+    }
+    if how.separate_specular && surfaces.iter().all(|surface| surface.specular.is_none()) {
+        let why = if !how.all_textures {
+            "no colour is baked; --all-textures asks for it"
+        } else if !how.textures.is_correlated() {
+            "base colour and metalness are averaged one by one"
+        } else {
+            "no material has base colour and metalness that are chosen together"
+        };
+        warnings.push(format!("--separate-specular has nothing to act on: {why}"));
     }
     let skin = scene.primitives.iter().any(|p| how.wants(scene, p));
     if !apart && surfaces.is_empty() && !how.all_textures && !skin {
@@ -757,9 +798,14 @@ impl SurfaceBaker<'_> {
         let reflectance = surface.reflectance.as_ref();
         let cutoff = options.alpha_coverage.of_material(m);
         let kernel = options.kernel;
-        let together = together(&surface.maps.maps, reflectance, cutoff, &m.name, kernel, self.task)?;
+        let separate = surface.specular.is_some();
+        let together =
+            together(&surface.maps.maps, reflectance, cutoff, separate, &m.name, kernel, self.task)?;
         let pair = together.pair.as_ref();
-        let color = pair.map(|pair| color_texture(pair, &m.name, options, self.task)).transpose()?;
+        let texture = |levels, content| color_texture(levels, content, &m.name, options, self.task);
+        let color = pair.map(|pair| texture(&pair.color, Content::Color)).transpose()?;
+        let specular = pair.filter(|_| separate);
+        let specular = specular.map(|pair| texture(&pair.specular, Content::SpecularColor)).transpose()?;
         let (maps, metallic) = (&together.maps, pair.map_or(&[][..], |pair| &pair.metallic));
         let size = maps.size();
         let mr = m.metallic_roughness.as_ref().and_then(|place| self.scene.images[place.image].clone());
@@ -819,6 +865,9 @@ impl SurfaceBaker<'_> {
             self.place_aniso(&outputs, materials);
             report.outputs.extend(outputs);
         }
+        if let Some(specular) = specular {
+            report.outputs.extend(self.place_specular(specular, materials)?);
+        }
         Ok((report, color))
     }
 
@@ -859,6 +908,35 @@ impl SurfaceBaker<'_> {
                 self.document.set_texture(material, Slot::Occlusion, new);
             }
             reset_factors(self.document.material_mut(material), planned.slot, like);
+        }
+        Ok(outputs)
+    }
+
+    /// Writes a specular colour, which lies as the surface does, and puts it into every material.
+    fn place_specular(&mut self, texture: Texture, materials: &[usize]) -> Result<Vec<Output>, Error> {
+        let name = format!("{}_{}", self.name, Content::SpecularColor.name());
+        let outputs = put_texture(&self.how.textures, &name, Content::SpecularColor, texture, self.out)?;
+        // Level 0 is one colour.
+        let file = format!("{name}.png");
+        let code = byte_from_linear(DIELECTRIC_F0 / specular_white());
+        let bytes = encode_png(&Image::new(1, 1, Channels::Rgb, Pixels::U8(vec![code; 3]))?)?;
+        self.out.put(&file, &bytes)?;
+        self.written.push(WrittenFile::new(&file, &bytes));
+        let source = self.document.add_image_file(&file);
+        let alternatives = alternatives(self.document, &outputs);
+        let like = SURFACE_SLOTS.iter().find_map(|&slot| self.document.texture(materials[0], slot));
+        let new = self.document.add_texture(like, Some(source), &alternatives);
+        for &material in materials {
+            self.document.set_texture(material, Slot::SpecularColor, new);
+            let material = self.document.material_mut(material);
+            let info = like_surface(material);
+            let extension = material.get_mut("extensions").and_then(|e| e.get_mut("KHR_materials_specular"));
+            if let Some(extension) = extension.and_then(Value::as_object_mut) {
+                let factor = specular_white() / DIELECTRIC_F0;
+                extension.insert("specularColorFactor".into(), vec![factor; 3].into());
+                let texture = extension.get_mut("specularColorTexture").and_then(Value::as_object_mut);
+                texture.into_iter().for_each(|texture| texture.extend(info.clone()));
+            }
         }
         Ok(outputs)
     }

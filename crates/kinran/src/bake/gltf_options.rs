@@ -18,6 +18,9 @@ pub struct GltfOptions {
     pub form: Form,
     /// Whether base colour, emission and occlusion are baked too.
     pub all_textures: bool,
+    /// Whether a specular colour is chosen together with base colour and metalness, for materials whose `KHR_materials_specular`
+    /// and `KHR_materials_ior` say nothing. It takes [`GltfOptions::all_textures`].
+    pub separate_specular: bool,
     /// Which way green points in normal maps, where they are not as glTF wants them; they are turned over where it points
     /// down.
     pub green: Option<Green>,
@@ -39,6 +42,7 @@ impl Default for GltfOptions {
             textures: TextureOptions::default(),
             form: Form::Khr,
             all_textures: false,
+            separate_specular: false,
             green: None,
             allow_outside: Vec::new(),
             skin: Vec::new(),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use kinran_bake::aniso::{Kernel, Reflectance, ReflectanceMaps, SurfaceMaps};
 use kinran_bake::metal::{Apart, BaseAndMetal, apart, base_and_metal};
-use kinran_bake::{compress_levels, keep_coverage};
+use kinran_bake::{Rgba8Level, compress_levels, keep_coverage};
 use kinran_image::{Role, Texture, Transfer};
 
 use super::mip_texels;
@@ -21,9 +21,9 @@ pub struct Together {
     pub pair: Option<BaseAndMetal>,
 }
 
-/// Weighs the texels of a surface, and chooses base colour and metalness of its levels, where they can be; the maps as they are
-/// where nothing is said of what they reflect. The base colour is cut out at `cutoff` where there is one. `name` is that of the
-/// material.
+/// Weighs the texels of a surface, and chooses base colour and metalness of its levels, where they can be, with a specular colour
+/// where it is to be `separate`; the maps as they are where nothing is said of what they reflect. The base colour is cut out at
+/// `cutoff` where there is one. `name` is that of the material.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
@@ -31,6 +31,7 @@ pub fn together(
     maps: &SurfaceMaps,
     reflectance: Option<&Reflectance>,
     cutoff: Option<f32>,
+    separate: bool,
     name: &str,
     kernel: Kernel,
     task: Task<'_>,
@@ -45,7 +46,8 @@ pub fn together(
         let own = reflectance.size();
         let size = (own.0.max(surface.0), own.1.max(surface.1));
         let choosing = task.begin(Stage::Averaging(Content::Color), name, mip_texels(size))?;
-        let mut pair = match base_and_metal(reflectance, surface, kernel, &|texels| choosing.tick(texels)) {
+        let tick = |texels| choosing.tick(texels);
+        let mut pair = match base_and_metal(reflectance, surface, kernel, separate, &tick) {
             Ok(pair) => pair,
             Err(Apart::Cancelled(stopped)) => return Err(stopped.into()),
             Err(_) => return Ok(together),
@@ -63,17 +65,18 @@ pub fn together(
     Ok(together)
 }
 
-/// A base colour that was chosen together with metalness, as a texture.
+/// Levels of a colour that was chosen together with metalness, as a texture.
 pub(super) fn color_texture(
-    pair: &BaseAndMetal,
+    levels: &[Rgba8Level],
+    content: Content,
     name: &str,
     how: &TextureOptions,
     task: Task<'_>,
 ) -> Result<Texture, Error> {
-    let texels = pair.color.iter().map(|level| u64::from(level.width) * u64::from(level.height));
-    let compressing = task.begin(Stage::Averaging(Content::Color), name, texels.sum())?;
+    let texels = levels.iter().map(|level| u64::from(level.width) * u64::from(level.height));
+    let compressing = task.begin(Stage::Averaging(content), name, texels.sum())?;
     let encoding = how.encoding(Role::Color, how.color_format);
-    Ok(compress_levels(&pair.color, Transfer::Srgb, encoding, &|texels| compressing.tick(texels))?)
+    Ok(compress_levels(levels, Transfer::Srgb, encoding, &|texels| compressing.tick(texels))?)
 }
 
 /// A sentence where base colour and metalness are averaged one by one though both vary.
