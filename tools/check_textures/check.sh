@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Checks the KTX2 and DDS files that kinran-image writes with readers that are not ours: ktx-parse and zstddec
-# (npm, what three.js loads KTX2 with), texture2ddecoder and OpenImageIO (PyPI). Prints a line per file and
+# (npm, what three.js loads KTX2 with), Binomial's transcoder of UASTC (as three.js brings it), texture2ddecoder and OpenImageIO (PyPI). Prints a line per file and
 # fails at any difference. Everything it installs goes to .tools/check_textures; a second run installs nothing.
 # KINRAN_BUILT names a folder of programs that are built already (target/checked).
 set -euo pipefail
@@ -18,9 +18,9 @@ if [ ! -e "$work/venv/installed" ]; then
         OpenImageIO==3.2.2.0 texture2ddecoder==1.0.6 numpy Pillow
     touch "$work/venv/installed"
 fi
-if [ ! -e "$work/node_modules/installed" ]; then
-    npm install --silent --no-save --no-audit --no-fund --prefix "$work" ktx-parse@2.0 zstddec@0.3
-    touch "$work/node_modules/installed"
+if [ ! -e "$work/node_modules/installed-2" ]; then
+    npm install --silent --no-save --no-audit --no-fund --prefix "$work" ktx-parse@2.0 zstddec@0.3 three@0.187.0
+    touch "$work/node_modules/installed-2"
 fi
 
 samples=$work/samples

@@ -10,7 +10,7 @@ mod settings;
 
 use std::path::{Path, PathBuf};
 
-use kinran::bake::{FolderOptions, GltfOptions};
+use kinran::bake::{FolderOptions, GltfOptions, Target};
 use kinran::options::{AlphaCoverage, Container, Form, TextureOptions};
 use kinran_bake::aniso::{Filter, Kernel};
 use kinran_bake::folder::{FolderError, Green, Hints, Role as MapRole};
@@ -89,27 +89,32 @@ pub struct Args {
     #[arg(long, value_parser = choice(FORMS))]
     pub form: Option<Form>,
 
-    /// File format of the textures
-    #[arg(long, default_value = "ktx2", value_parser = choice(CONTAINERS))]
-    pub container: Container,
+    /// Who is to read the textures of a glTF file; the formats and the container below go by it [default: who reads the formats
+    /// and the container that are given, else desktop]
+    #[arg(long, value_parser = choice(TARGETS))]
+    pub target: Option<Target>,
+
+    /// File format of the textures [default: ktx2; of a glTF file, what its target has]
+    #[arg(long, value_parser = choice(CONTAINERS))]
+    pub container: Option<Container>,
 
     /// Zstandard level of KTX2 files, 0 for none
     #[arg(long, value_name = "LEVEL", default_value_t = DEFAULT_ZSTD, value_parser = clap::value_parser!(i32).range(0..=22))]
     pub zstd: i32,
 
-    /// Format of normal maps [default: bc5]
+    /// Format of normal maps [default: bc5; of a glTF file, what its target has]
     #[arg(long, value_name = "FORMAT", value_parser = choice(FORMATS))]
     pub normal_format: Option<Format>,
 
-    /// Format of aniso, anisotropy, roughness and orm maps [default: bc7]
+    /// Format of aniso, anisotropy, roughness and orm maps [default: bc7; of a glTF file, what its target has]
     #[arg(long, value_name = "FORMAT", value_parser = choice(FORMATS))]
     pub aniso_format: Option<Format>,
 
-    /// Format of colour maps [default: bc7]
+    /// Format of colour maps [default: bc7; of a glTF file, what its target has]
     #[arg(long, value_name = "FORMAT", value_parser = choice(FORMATS))]
     pub color_format: Option<Format>,
 
-    /// Who compresses blocks; portable gives the same bytes on every processor
+    /// Who compresses blocks of BCn; portable gives the same bytes on every processor, as does the encoder of uastc
     #[arg(long, value_parser = choice(ENCODERS))]
     pub encoder: Option<Encoder>,
 
@@ -231,6 +236,18 @@ const FORMS: &Choices<Form> = &[
     (Form::Both, "both", "Both"),
 ];
 
+/// Who reads a glTF file's textures.
+const TARGETS: &Choices<Target> = &[
+    (Target::Web, "web", "Every viewer: UASTC in KTX2, which they turn into what their GPU knows, and PNG"),
+    (
+        Target::Desktop,
+        "desktop",
+        "Viewers that hand BC7 and BC5 in KTX2 to a desktop's GPU: three.js r184 and later; and PNG",
+    ),
+    (Target::Engine, "engine", "Engines that read BC7 and BC5 in DDS; viewers take the PNG beside it"),
+    (Target::Plain, "plain", "PNG alone: level 0, with factors baked in; all other levels are the viewer's"),
+];
+
 /// Block encoders.
 const ENCODERS: &Choices<Encoder> = &[
     (Encoder::Ispc, "ispc", "Intel's, the fastest"),
@@ -287,8 +304,11 @@ impl Args {
 
     /// Refuses flags about textures that contradict each other.
     fn check_textures(&self) -> Result<(), Error> {
-        if self.zstd != DEFAULT_ZSTD && self.container == Container::Dds {
-            let reason = "DDS files are not compressed; leave it out, or write KTX2";
+        let target = |target| self.container.is_none() && self.target == Some(target);
+        let no_ktx2 =
+            self.container == Some(Container::Dds) || target(Target::Engine) || target(Target::Plain);
+        if self.zstd != DEFAULT_ZSTD && no_ktx2 {
+            let reason = "DDS files are not compressed, and PNG not by it; leave it out, or write KTX2";
             return Err(Error::flag_error(format!("--zstd {}", self.zstd), reason));
         }
         Ok(self.textures().check()?)
@@ -306,7 +326,7 @@ impl Args {
     fn gltf_options(&self) -> GltfOptions {
         let mut how = GltfOptions::default();
         (how.textures, how.green, how.source) = (self.textures(), self.green(), self.source());
-        how.form = self.form.unwrap_or(how.form);
+        (how.target, how.form) = (self.target, self.form.unwrap_or(how.form));
         (how.all_textures, how.estimate_normals) = (self.all_textures, self.curvature.estimate_normals);
         how.separate_specular = self.separate_specular;
         how.allow_outside.clone_from(&self.model.allow_outside);
@@ -345,6 +365,9 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
         return Err(Error::flag_error_of(&args.input, format!("--{}", flag.name), reason));
     }
     args.check_textures()?;
+    if is_gltf(&args.input) {
+        args.gltf_options().settled()?;
+    }
     let gltf = is_gltf(&args.input);
     if args.input.is_file() && !gltf {
         let is = |extensions: &[&str]| extensions.iter().any(|e| has_extension(&args.input, e));

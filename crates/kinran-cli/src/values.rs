@@ -83,6 +83,7 @@ pub(crate) const FORMATS: &Choices<Format> = &[
     (Format::Bc4, "bc4", ""),
     (Format::Bc5, "bc5", ""),
     (Format::Bc7, "bc7", ""),
+    (Format::Uastc, "uastc", ""),
     (Format::Rgba8, "rgba8", ""),
     (Format::Rgba16F, "rgba16f", ""),
 ];

@@ -1189,3 +1189,188 @@ fn sample_assets_do_not_bake() {
         }
     }
 }
+
+/// Format and channels of the texture in a slot, and whether a PNG stands beside it.
+fn stored(folder: &Path, document: &Value, info: &Value) -> (Vec<(String, Format)>, bool) {
+    let texture = &document["textures"][info["index"].as_u64().unwrap() as usize];
+    let uri = |index: &Value| document["images"][index.as_u64().unwrap() as usize]["uri"].as_str().unwrap();
+    let with_levels = texture["extensions"].as_object().into_iter().flatten().map(|(name, extension)| {
+        let texture = read_texture(&folder.join(uri(&extension["source"]))).unwrap();
+        assert_eq!(texture.levels.len(), 6, "{name}");
+        (name.clone(), texture.format)
+    });
+    let png = texture.get("source").is_some_and(|source| folder.join(uri(source)).is_file());
+    (with_levels.collect(), png)
+}
+
+#[test]
+fn a_target_stores_what_its_readers_do_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = anisotropic_model(folder.path());
+    let (basisu, dds) = ("KHR_texture_basisu".to_owned(), "MSFT_texture_dds".to_owned());
+    for (flags, normal, others) in [
+        (&["--target", "web"][..], vec![(&basisu, Format::Uastc)], vec![(&basisu, Format::Uastc)]),
+        (&["--target", "desktop"], vec![(&basisu, Format::Bc5)], vec![(&basisu, Format::Bc7)]),
+        (&["--target", "engine"], vec![(&dds, Format::Bc5)], vec![(&dds, Format::Bc7)]),
+        (&["--target", "plain"], vec![], vec![]),
+        (
+            &["--target", "engine", "--container", "both", "--normal-format", "bc7"],
+            vec![(&basisu, Format::Bc7), (&dds, Format::Bc7)],
+            vec![(&basisu, Format::Bc7), (&dds, Format::Bc7)],
+        ),
+        // Who asks for a container or a format that not every viewer reads means who reads it.
+        (&["--container", "dds"], vec![(&dds, Format::Bc5)], vec![(&dds, Format::Bc7)]),
+        (&["--normal-format", "rgba16f"], vec![(&basisu, Format::Rgba16F)], vec![(&basisu, Format::Bc7)]),
+        (&["--encoder", "ispc"], vec![(&basisu, Format::Bc5)], vec![(&basisu, Format::Bc7)]),
+    ] {
+        let out = tempfile::tempdir().unwrap();
+        kinran_json(&[&["bake", text(&model), "-o", text(out.path())], flags].concat());
+        let document: Value =
+            serde_json::from_slice(&std::fs::read(out.path().join("square.gltf")).unwrap()).unwrap();
+        let material = &document["materials"][0];
+        let anisotropy = &material["extensions"]["KHR_materials_anisotropy"]["anisotropyTexture"];
+        for (slot, wanted) in [
+            (&material["normalTexture"], &normal),
+            (&material["pbrMetallicRoughness"]["metallicRoughnessTexture"], &others),
+            (anisotropy, &others),
+        ] {
+            let (mut got, png) = stored(out.path(), &document, slot);
+            got.sort_by_key(|(name, _)| name.clone());
+            let wanted: Vec<_> = wanted.iter().map(|(name, format)| ((*name).clone(), *format)).collect();
+            assert_eq!(got, wanted, "{flags:?}");
+            assert!(png, "{flags:?}: there is no PNG for viewers that know no extension");
+        }
+        assert_eq!(document.get("extensionsRequired"), None, "{flags:?}");
+        let used = document["extensionsUsed"].as_array().unwrap();
+        for name in [&basisu, &dds] {
+            let is_there = normal.iter().any(|(there, _)| *there == name);
+            assert_eq!(used.contains(&json!(name)), is_there, "{flags:?}: {name} in {used:?}");
+        }
+    }
+}
+
+/// Viewers take x, y and z as they come.
+#[test]
+fn normals_for_the_web_lose_their_z() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = anisotropic_model(folder.path());
+    let out = tempfile::tempdir().unwrap();
+    kinran_json(&["bake", text(&model), "-o", text(out.path()), "--target", "web"]);
+    let [normal] =
+        &files(out.path()).into_iter().filter(|f| f.ends_with("normal.ktx2")).collect::<Vec<_>>()[..]
+    else {
+        panic!("{:?}", files(out.path()));
+    };
+    let texture = read_texture(&out.path().join(normal)).unwrap();
+    let png = read_image(&out.path().join(normal.replace("ktx2", "png"))).unwrap();
+    for (i, texel) in texture.decode_level(0).unwrap().iter().enumerate() {
+        let wanted = png.texel(i as u32 % 32, i as u32 / 32);
+        let off = (0..3).map(|c| (texel[c] - wanted[c]).abs()).fold(0.0, f32::max);
+        assert!(off < 0.03, "texel {i}: wanted {wanted:?} as in the PNG, got {texel:?}");
+    }
+}
+
+#[test]
+fn flags_that_contradict_a_target_are_swallowed() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = anisotropic_model(folder.path());
+    let out = folder.path().join("out");
+    for (target, flags) in [
+        ("web", &["--container", "dds"][..]),
+        ("web", &["--container", "both"]),
+        ("web", &["--normal-format", "bc5"]),
+        ("web", &["--aniso-format", "rgba16f"]),
+        ("web", &["--color-format", "bc1"]),
+        ("web", &["--encoder", "ispc"]),
+        ("desktop", &["--container", "dds"]),
+        ("engine", &["--container", "ktx2"]),
+        ("engine", &["--normal-format", "uastc"]),
+        ("plain", &["--container", "ktx2"]),
+        ("plain", &["--aniso-format", "bc7"]),
+        ("plain", &["--form", "aniso"]),
+        ("plain", &["--form", "both"]),
+        ("plain", &["--all-textures"]),
+    ] {
+        let args = [&["bake", text(&model), "-o", text(&out), "--target", target], flags].concat();
+        refused(&args, &[flags[0]]);
+        refused(&[&args[..], &["--dry-run"]].concat(), &[flags[0]]);
+        let manifest = folder.path().join("kinran.toml");
+        let value = flags.get(1).map_or("true".into(), |value| format!("\"{value}\""));
+        let entry = format!(
+            "output = \"lib\"\n[[mesh]]\ninput = \"square.gltf\"\ntarget = \"{target}\"\n{} = {value}\n",
+            flags[0].trim_start_matches('-')
+        );
+        std::fs::write(&manifest, entry).unwrap();
+        let said = kinran(&["bake", text(&manifest), "--dry-run"]);
+        let is_told = said.err.contains("kinran.toml:3") && said.err.contains(flags[0]);
+        assert!(said.code == Some(2) && is_told, "{target} {flags:?} in a manifest: {}", said.err);
+        std::fs::remove_file(&manifest).unwrap();
+    }
+    assert!(!out.exists(), "written: {:?}", files(&out));
+    let maps = cloth(32);
+    refused(&["bake", text(maps.path()), "-o", text(&out), "--target", "web"], &["--target", "glTF"]);
+}
+
+/// 30 × 18 texels: `KHR_texture_basisu` forbids them, and WebGL shows them black.
+#[test]
+fn maps_without_whole_blocks_become_textures_that_are_black() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = anisotropic_model(folder.path());
+    let bumps = bumps();
+    let samples = (0..18)
+        .flat_map(|y| (0..30).map(move |x| (x, y)))
+        .flat_map(|(x, y)| bumps.texel(x, y).map(|v| (v * 255.0).round() as u8)[..3].to_vec());
+    let cut = Image::new(30, 18, Channels::Rgb, Pixels::U8(samples.collect())).unwrap();
+    write(folder.path(), "bumps.png", &cut);
+    write(folder.path(), "orm.png", &cut);
+    for target in ["web", "desktop", "engine"] {
+        let out = tempfile::tempdir().unwrap();
+        let args = ["bake", text(&model), "-o", text(out.path()), "--target", target, "--all-textures"];
+        let said = kinran(&args);
+        assert_eq!(said.code, Some(0), "{}", said.err);
+        let with_levels =
+            files(out.path()).iter().filter(|f| f.ends_with(".ktx2") || f.ends_with(".dds")).count();
+        assert_eq!(with_levels, if target == "engine" { 3 } else { 0 }, "{target}: {:?}", files(out.path()));
+        let is_told = said.err.contains("30x18") && said.err.contains("32x20");
+        assert_eq!(is_told, target != "engine", "{target}: {}", said.err);
+        assert!(out.path().join("square_hammered_normal.png").is_file(), "{target}: {:?}", files(out.path()));
+        let said = kinran(&["inspect", text(&out.path().join("square.gltf")), "--json"]);
+        assert_eq!(said.code, Some(0), "{}", said.err);
+    }
+}
+
+/// A file whose textures are Basis Universal's alone, as optimisers leave it.
+#[test]
+fn a_model_that_was_optimised_first_leaves_plain_viewers_without_textures() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = anisotropic_model(folder.path());
+    let web = folder.path().join("web");
+    kinran_json(&["bake", text(&model), "-o", text(&web), "--target", "web", "--all-textures"]);
+    let path = web.join("square.gltf");
+    let mut document: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    for texture in document["textures"].as_array_mut().unwrap() {
+        if texture.get("extensions").is_some() {
+            texture.as_object_mut().unwrap().remove("source");
+        }
+    }
+    document["extensionsRequired"] = json!(["KHR_texture_basisu"]);
+    // What is not known may refer to images, which stay then.
+    document["extensionsUsed"].as_array_mut().unwrap().retain(|name| name != "EXT_made_up");
+    document["materials"][0]["extensions"].as_object_mut().unwrap().remove("EXT_made_up");
+    let path = web.join("optimised.gltf");
+    std::fs::write(&path, serde_json::to_vec(&document).unwrap()).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    kinran_json(&["bake", text(&path), "-o", text(out.path()), "--target", "web", "--all-textures"]);
+    let document: Value =
+        serde_json::from_slice(&std::fs::read(out.path().join("optimised.gltf")).unwrap()).unwrap();
+    let normal = &document["materials"][0]["normalTexture"];
+    assert_eq!(
+        stored(out.path(), &document, normal),
+        (vec![("KHR_texture_basisu".into(), Format::Uastc)], true)
+    );
+    assert_eq!(document.get("extensionsRequired"), None, "all textures have a PNG");
+    for image in document["images"].as_array().unwrap() {
+        let uri = image["uri"].as_str().unwrap();
+        assert!(out.path().join(uri).is_file(), "{uri}");
+    }
+}

@@ -1,4 +1,5 @@
-//! Texels to and from the formats GPUs sample: BC1, BC4, BC5, BC7, RGBA8 and half floats.
+//! Texels to and from the formats GPUs sample: BC1, BC4, BC5, BC7, RGBA8 and half floats, and UASTC, which becomes one of
+//! theirs.
 //!
 //! Blocks are encoded independently of each other and images in strips of whole block rows, so the bytes
 //! depend neither on the number of threads nor on where an image was cut. [`Encoder::Portable`] gives the
@@ -9,6 +10,7 @@ use half::f16;
 use half::slice::HalfFloatSliceExt;
 use rayon::prelude::*;
 
+use crate::basis;
 use crate::image::check_sides;
 use crate::opaque::{keep_opaque, with_own_alpha};
 use crate::{Error, Format};
@@ -59,7 +61,7 @@ pub enum Preset {
 pub struct Encoding {
     /// The layout of the bytes.
     pub format: Format,
-    /// Who compresses.
+    /// Who compresses; of [`Format::Uastc`], which has one encoder, it says nothing.
     pub encoder: Encoder,
     /// How long that may take.
     pub preset: Preset,
@@ -108,8 +110,8 @@ const STRIP_ROWS: usize = 4;
 ///
 /// `rgba8` is `width * height * 4` bytes, rows packed, R first. BC1 keeps R, G and B, BC4 keeps R, BC5
 /// keeps R and G. Sides that are no multiple of 4 are filled up by repeating the last texel. Blocks of
-/// one colour decode to exactly that colour in BC4, BC5 and BC7 (in BC5 each channel by itself), opaque texels to alpha
-/// 255 in all formats.
+/// one colour decode to exactly that colour in BC4, BC5, BC7 and UASTC (in BC5 each channel by itself), opaque texels to
+/// alpha 255 in all formats (in UASTC where all of a block are).
 /// Encoding a part that starts at a multiple of 4 rows gives exactly the corresponding bytes of the whole.
 ///
 /// # Errors
@@ -156,6 +158,9 @@ fn check_request(encoding: Encoding, rgba8: &[u8], width: u32, height: u32) -> R
     }
     if encoding.format == Format::Rgba16F {
         return Err(Error::Unsupported("half floats are encoded from floats, by encode_half".into()));
+    }
+    if encoding.format == Format::Uastc {
+        return basis::check_request(width);
     }
     if encoding.encoder == Encoder::Ispc && !cfg!(feature = "ispc") {
         return Err(Error::Unsupported(
@@ -207,6 +212,7 @@ fn encode_strip(
     };
 
     match encoding.encoder {
+        _ if encoding.format == Format::Uastc => return encode_uastc(encoding.preset, texels, padded_w, out),
         Encoder::Portable => encode_portable(encoding, texels, padded_w, out)?,
         #[cfg(feature = "ispc")]
         Encoder::Ispc => encode_ispc(encoding, texels, padded_w, out),
@@ -261,7 +267,7 @@ fn encode_portable(encoding: Encoding, texels: &[u8], width: usize, out: &mut [u
         Format::Bc4 => dds::Format::BC4_UNORM,
         Format::Bc5 => dds::Format::BC5_UNORM,
         Format::Bc7 => dds::Format::BC7_UNORM,
-        Format::Rgba8 | Format::Rgba16F => unreachable!("not a block format"),
+        Format::Uastc | Format::Rgba8 | Format::Rgba16F => unreachable!("not this encoder's"),
     };
     let mut options = dds::EncodeOptions::default();
     options.parallel = false;
@@ -276,6 +282,27 @@ fn encode_portable(encoding: Encoding, texels: &[u8], width: usize, out: &mut [u
     let mut rest = out;
     dds::encode(&mut rest, view, format, None, &options)
         .map_err(|e| Error::Unsupported(format!("the portable encoder failed: {e}")))
+}
+
+#[cfg(feature = "uastc")]
+fn encode_uastc(preset: Preset, texels: &[u8], width: usize, out: &mut [u8]) -> Result<(), Error> {
+    use kinran_uastc::Effort;
+
+    let effort = match preset {
+        Preset::Fast => Effort::Fast,
+        Preset::Normal => Effort::Normal,
+        Preset::Best => Effort::Best,
+    };
+    let height = texels.len() / (width * 4);
+    let blocks = kinran_uastc::encode(texels, width as u32, height as u32, effort)
+        .map_err(|reason| Error::Unsupported(format!("UASTC: {reason}")))?;
+    out.copy_from_slice(&blocks);
+    Ok(())
+}
+
+#[cfg(not(feature = "uastc"))]
+fn encode_uastc(_: Preset, _: &[u8], _: usize, _: &mut [u8]) -> Result<(), Error> {
+    unreachable!("refused by check_request")
 }
 
 #[cfg(feature = "ispc")]
@@ -334,7 +361,7 @@ fn encode_ispc(encoding: Encoding, texels: &[u8], width: usize, out: &mut [u8]) 
                 }
             }
         }
-        Format::Rgba8 | Format::Rgba16F => unreachable!("not a block format"),
+        Format::Uastc | Format::Rgba8 | Format::Rgba16F => unreachable!("not this encoder's"),
     }
 }
 
@@ -365,7 +392,7 @@ fn write_constant_blocks(format: Format, texels: &[u8], width: usize, out: &mut 
                     block.copy_from_slice(&constant_bc7(first));
                 }
             }
-            Format::Bc1 | Format::Rgba8 | Format::Rgba16F => {}
+            Format::Bc1 | Format::Uastc | Format::Rgba8 | Format::Rgba16F => {}
         }
     }
 }
@@ -453,8 +480,8 @@ pub fn encode_half(rgba: &[[f32; 4]]) -> Result<Vec<u8>, Error> {
 /// values are not all multiples of 1/255. sRGB is not linearised.
 ///
 /// # Errors
-/// [`Error::Unsupported`] where a side is 0 or above [`MAX_SIDE`](crate::MAX_SIDE), or `data` is not
-/// [`Format::level_bytes`] long.
+/// [`Error::Unsupported`] where a side is 0 or above [`MAX_SIDE`](crate::MAX_SIDE), `data` is not
+/// [`Format::level_bytes`] long, or a block of UASTC is none.
 pub fn decode(format: Format, data: &[u8], width: u32, height: u32) -> Result<Vec<[f32; 4]>, Error> {
     check_sides(width, height).map_err(Error::Unsupported)?;
     let wanted = format.level_bytes(width, height);
@@ -468,6 +495,15 @@ pub fn decode(format: Format, data: &[u8], width: u32, height: u32) -> Result<Ve
     let mut texels = vec![[0.0; 4]; w * height as usize];
     let side = format.block_side() as usize;
     let row_bytes = format.level_bytes(width, 1);
+    if format == Format::Uastc {
+        let rows = w * side * basis::DECODED_ROWS;
+        texels
+            .par_chunks_mut(rows)
+            .zip(data.par_chunks(row_bytes * basis::DECODED_ROWS))
+            .try_for_each(|(texels, blocks)| basis::decode_blocks(blocks, width, texels))
+            .map_err(|reason| Error::Unsupported(format!("{width}x{height} in {format:?}: {reason}")))?;
+        return Ok(texels);
+    }
     texels.par_chunks_mut(w * side).zip(data.par_chunks(row_bytes)).for_each(|(rows, blocks)| {
         let block_height = rows.len() / w;
         for (bx, block) in blocks.chunks_exact(format.block_bytes()).enumerate() {
@@ -508,6 +544,7 @@ fn decode_block(format: Format, block: &[u8]) -> [[f32; 4]; 16] {
                 (texel[0], texel[1]) = (*r, *g);
             }
         }
+        Format::Uastc => unreachable!("decoded row by row"),
         Format::Rgba8 => texels[0] = std::array::from_fn(|c| f32::from(block[c]) / 255.0),
         Format::Rgba16F => {
             texels[0] =

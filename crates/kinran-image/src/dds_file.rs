@@ -15,8 +15,8 @@ use crate::{Error, Format, Level, Texture, Transfer};
 /// The bytes of a texture as a DDS file. DDS has no place for metadata.
 ///
 /// # Errors
-/// [`Error::Unsupported`] where [`Texture::check`] refuses the texture, or level 0 takes 4 GiB or more,
-/// which the header cannot say.
+/// [`Error::Unsupported`] where [`Texture::check`] refuses the texture, its format is [`Format::Uastc`], which DDS has no
+/// number for, or level 0 takes 4 GiB or more, which the header cannot say.
 pub fn encode_dds(texture: &Texture) -> Result<Vec<u8>, Error> {
     texture.check()?;
     texture.check_transfer()?;
@@ -24,7 +24,8 @@ pub fn encode_dds(texture: &Texture) -> Result<Vec<u8>, Error> {
     if u32::try_from(first.data.len()).is_err() {
         return Err(Error::Unsupported("DDS holds less than 4 GiB; write KTX2 or a block format".into()));
     }
-    let format = dxgi_format(texture.format, texture.transfer);
+    let format = dxgi_format(texture.format, texture.transfer)
+        .ok_or_else(|| Error::Unsupported("DDS holds no UASTC; write KTX2 or another format".into()))?;
     let levels = texture.levels.len() as u32;
     let header = Header::new_dxgi(first.height, first.width, None, format, Some(levels), None, None)
         .map_err(|e| Error::Unsupported(format!("DDS: {e}")))?;
@@ -42,9 +43,10 @@ pub fn encode_dds(texture: &Texture) -> Result<Vec<u8>, Error> {
     Ok(file)
 }
 
-fn dxgi_format(format: Format, transfer: Transfer) -> DxgiFormat {
+fn dxgi_format(format: Format, transfer: Transfer) -> Option<DxgiFormat> {
     use Transfer::Srgb;
-    match (format, transfer) {
+    Some(match (format, transfer) {
+        (Format::Uastc, _) => return None,
         (Format::Bc1, Srgb) => DxgiFormat::BC1_UNorm_sRGB,
         (Format::Bc1, _) => DxgiFormat::BC1_UNorm,
         (Format::Bc4, _) => DxgiFormat::BC4_UNorm,
@@ -54,7 +56,7 @@ fn dxgi_format(format: Format, transfer: Transfer) -> DxgiFormat {
         (Format::Rgba8, Srgb) => DxgiFormat::R8G8B8A8_UNorm_sRGB,
         (Format::Rgba8, _) => DxgiFormat::R8G8B8A8_UNorm,
         (Format::Rgba16F, _) => DxgiFormat::R16G16B16A16_Float,
-    }
+    })
 }
 
 /// Reads a DDS file: a 2D texture in one of our formats, or in 8 to 32 bits a texel with channels of whole bytes in any

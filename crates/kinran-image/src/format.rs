@@ -11,6 +11,8 @@ pub enum Format {
     Bc5,
     /// 8 bits a texel, RGBA.
     Bc7,
+    /// 8 bits a texel, RGBA, in blocks that viewers turn into those of their GPU (Basis Universal); in KTX2 alone.
+    Uastc,
     /// One byte a channel.
     Rgba8,
     /// One half float a channel.
@@ -19,8 +21,8 @@ pub enum Format {
 
 impl Format {
     /// All formats.
-    pub const ALL: [Format; 6] =
-        [Format::Bc1, Format::Bc4, Format::Bc5, Format::Bc7, Format::Rgba8, Format::Rgba16F];
+    pub const ALL: [Format; 7] =
+        [Format::Bc1, Format::Bc4, Format::Bc5, Format::Bc7, Format::Uastc, Format::Rgba8, Format::Rgba16F];
 
     /// What reports, messages and flags call it.
     pub fn name(self) -> &'static str {
@@ -29,6 +31,7 @@ impl Format {
             Format::Bc4 => "bc4",
             Format::Bc5 => "bc5",
             Format::Bc7 => "bc7",
+            Format::Uastc => "uastc",
             Format::Rgba8 => "rgba8",
             Format::Rgba16F => "rgba16f",
         }
@@ -40,14 +43,14 @@ impl Format {
             Format::Bc4 => 1,
             Format::Bc5 => 2,
             Format::Bc1 => 3,
-            Format::Bc7 | Format::Rgba8 | Format::Rgba16F => 4,
+            Format::Bc7 | Format::Uastc | Format::Rgba8 | Format::Rgba16F => 4,
         }
     }
 
     /// Texels along a side of the unit the bytes come in: 4 for block formats, 1 for the others.
     pub fn block_side(self) -> u32 {
         match self {
-            Format::Bc1 | Format::Bc4 | Format::Bc5 | Format::Bc7 => 4,
+            Format::Bc1 | Format::Bc4 | Format::Bc5 | Format::Bc7 | Format::Uastc => 4,
             Format::Rgba8 | Format::Rgba16F => 1,
         }
     }
@@ -57,7 +60,7 @@ impl Format {
         match self {
             Format::Rgba8 => 4,
             Format::Bc1 | Format::Bc4 | Format::Rgba16F => 8,
-            Format::Bc5 | Format::Bc7 => 16,
+            Format::Bc5 | Format::Bc7 | Format::Uastc => 16,
         }
     }
 
@@ -67,9 +70,14 @@ impl Format {
         width.div_ceil(side) as usize * height.div_ceil(side) as usize * self.block_bytes()
     }
 
-    /// Whether the GPU can linearise this format's colour while sampling.
+    /// Whether this build can encode it: [`Format::Uastc`] takes the feature `uastc`.
+    pub fn has_encoder(self) -> bool {
+        self != Format::Uastc || cfg!(feature = "uastc")
+    }
+
+    /// Whether the GPU can linearise this format's colour while sampling (of UASTC, the format that it becomes).
     pub fn has_srgb(self) -> bool {
-        matches!(self, Format::Bc1 | Format::Bc7 | Format::Rgba8)
+        matches!(self, Format::Bc1 | Format::Bc7 | Format::Uastc | Format::Rgba8)
     }
 }
 

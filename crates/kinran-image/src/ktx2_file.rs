@@ -8,6 +8,7 @@ use ktx2::dfd::{Basic, Block};
 use ktx2::{Header, Index, KeyValueDataIterator, LevelIndex, SupercompressionScheme};
 use rayon::prelude::*;
 
+use crate::basis::{self, Kind};
 use crate::image::check_sides;
 use crate::texture::{full_level_count, level_size};
 use crate::{Error, Format, Level, Texture, Transfer};
@@ -32,22 +33,27 @@ pub fn encode_ktx2(texture: &Texture, zstd: Option<i32>) -> Result<Vec<u8>, Erro
         return Err(Error::Unsupported(format!("Zstandard has no compression level {level}; use 1 to 22")));
     }
     let format = ktx2_format(texture.format, texture.transfer);
-    let (mut descriptor, type_size) =
-        Basic::from_format(format).map_err(|e| Error::Unsupported(format!("{:?}: {e}", texture.format)))?;
-    // Linear maps are no colours.
-    if texture.transfer == Transfer::Linear {
-        descriptor.color_primaries = None;
-    }
+    let (block, type_size) = match format {
+        Some(format) => {
+            let (mut descriptor, type_size) = Basic::from_format(format)
+                .map_err(|e| Error::Unsupported(format!("{:?}: {e}", texture.format)))?;
+            // Linear maps are no colours.
+            if texture.transfer == Transfer::Linear {
+                descriptor.color_primaries = None;
+            }
+            (Block::Basic(descriptor).to_vec(), type_size)
+        }
+        None => (basis::descriptor(texture.transfer, !is_opaque(texture)?).to_vec(), 1),
+    };
     let key_values = key_value_data(&texture.metadata)?;
 
     // Lay out the sections: header, level index, descriptor, key/values, levels from the smallest up.
-    let block = Block::Basic(descriptor).to_vec();
     let dfd_offset = Header::LENGTH + texture.levels.len() * LevelIndex::LENGTH;
     let dfd_length = 4 + block.len();
     let kvd_offset = dfd_offset + dfd_length;
     let first = &texture.levels[0];
     let header = Header {
-        format: Some(format),
+        format,
         type_size,
         pixel_width: first.width,
         pixel_height: first.height,
@@ -98,6 +104,15 @@ pub fn encode_ktx2(texture: &Texture, zstd: Option<i32>) -> Result<Vec<u8>, Erro
     Ok(file)
 }
 
+/// Whether no texel of UASTC is seen through.
+fn is_opaque(texture: &Texture) -> Result<bool, Error> {
+    let mut opaque = true;
+    for level in &texture.levels {
+        opaque &= basis::is_opaque(level).map_err(Error::Unsupported)?;
+    }
+    Ok(opaque)
+}
+
 /// The key/value section: entries sorted by key, each a length, "key NUL value NUL" and padding to 4.
 fn key_value_data(metadata: &BTreeMap<String, String>) -> Result<Vec<u8>, Error> {
     let mut entries = metadata.clone();
@@ -119,9 +134,11 @@ fn key_value_data(metadata: &BTreeMap<String, String>) -> Result<Vec<u8>, Error>
     Ok(bytes)
 }
 
-fn ktx2_format(format: Format, transfer: Transfer) -> ktx2::Format {
+/// The format of a header; Basis Universal's have none.
+fn ktx2_format(format: Format, transfer: Transfer) -> Option<ktx2::Format> {
     use Transfer::Srgb;
-    match (format, transfer) {
+    Some(match (format, transfer) {
+        (Format::Uastc, _) => return None,
         (Format::Bc1, Srgb) => ktx2::Format::BC1_RGBA_SRGB_BLOCK,
         (Format::Bc1, _) => ktx2::Format::BC1_RGBA_UNORM_BLOCK,
         (Format::Bc4, _) => ktx2::Format::BC4_UNORM_BLOCK,
@@ -131,11 +148,11 @@ fn ktx2_format(format: Format, transfer: Transfer) -> ktx2::Format {
         (Format::Rgba8, Srgb) => ktx2::Format::R8G8B8A8_SRGB,
         (Format::Rgba8, _) => ktx2::Format::R8G8B8A8_UNORM,
         (Format::Rgba16F, _) => ktx2::Format::R16G16B16A16_SFLOAT,
-    }
+    })
 }
 
-/// Reads a KTX2 file: 2D, one layer, one face, in one of our formats, plain or with Zstandard levels. Its
-/// text metadata are kept, binary ones dropped.
+/// Reads a KTX2 file: 2D, one layer, one face, in one of our formats, plain or with Zstandard levels, or of BasisLZ
+/// (ETC1S), whose levels become [`Format::Rgba8`]. Its text metadata are kept, binary ones dropped.
 ///
 /// # Errors
 /// [`Error::Malformed`] under the name `name`, for every file that is not exactly that.
@@ -149,11 +166,15 @@ fn parse(bytes: &[u8]) -> Result<Texture, String> {
     let truncated = || crate::error::TRUNCATED.to_string();
     let (head, rest) = bytes.split_first_chunk::<{ Header::LENGTH }>().ok_or_else(truncated)?;
     let header = Header::from_bytes(head).map_err(|e| format!("{e}; the file is damaged"))?;
-    let Some((format, transfer)) = header.format.and_then(our_format) else {
-        return Err(match header.format {
-            Some(f) => format!("format {f:?} is not read; convert to BC1, BC4, BC5, BC7, RGBA8 or RGBA16F"),
-            None => "Basis Universal textures are not read; transcode to BC7 or RGBA8".into(),
-        });
+    let (format, transfer, kind) = match header.format {
+        Some(f) => our_format(f).map(|(format, transfer)| (format, transfer, None)).ok_or_else(|| {
+            format!("format {f:?} is not read; convert to BC1, BC4, BC5, BC7, RGBA8, RGBA16F or UASTC")
+        })?,
+        None => {
+            let (kind, transfer) = basis::described(bytes, header.index.dfd_byte_offset as usize)?;
+            let format = if kind == Kind::Uastc { Format::Uastc } else { Format::Rgba8 };
+            (format, transfer, Some(kind))
+        }
     };
     let (width, height) = (header.pixel_width, header.pixel_height);
     check_sides(width, height)?;
@@ -164,8 +185,11 @@ fn parse(bytes: &[u8]) -> Result<Texture, String> {
     if level_count > full_level_count(width, height) {
         return Err(format!("it claims {level_count} levels, more than {width}x{height} can have"));
     }
-    if !matches!(header.supercompression_scheme, None | Some(SupercompressionScheme::Zstandard)) {
-        return Err("its supercompression is not read; use Zstandard or none".into());
+    let is_basis_lz = kind == Some(Kind::Etc1s);
+    match header.supercompression_scheme {
+        Some(SupercompressionScheme::BasisLZ) if is_basis_lz => {}
+        None | Some(SupercompressionScheme::Zstandard) if !is_basis_lz => {}
+        _ => return Err("its supercompression is not read; use Zstandard, BasisLZ or none".into()),
     }
 
     let section = |offset: u64, length: u64| {
@@ -173,8 +197,11 @@ fn parse(bytes: &[u8]) -> Result<Texture, String> {
         end.and_then(|end| bytes.get(offset as usize..end)).ok_or_else(truncated)
     };
     let mut levels = Vec::with_capacity(level_count);
+    if is_basis_lz {
+        levels = basis::decode_etc1s(bytes, width, height, level_count)?;
+    }
     let (index, _) = rest.as_chunks::<{ LevelIndex::LENGTH }>();
-    for (i, entry) in index.get(..level_count).ok_or_else(truncated)?.iter().enumerate() {
+    for (i, entry) in index.get(..level_count).ok_or_else(truncated)?.iter().enumerate().skip(levels.len()) {
         let entry = LevelIndex::from_bytes(entry);
         let stored = section(entry.byte_offset, entry.byte_length)?;
         let (width, height) = (level_size(width, i), level_size(height, i));
@@ -186,7 +213,12 @@ fn parse(bytes: &[u8]) -> Result<Texture, String> {
         if data.len() != wanted || entry.uncompressed_byte_length != wanted as u64 {
             return Err(format!("level {i}, {width}x{height} in {format:?}, must hold {wanted} bytes"));
         }
-        levels.push(Level { width, height, data });
+        let level = Level { width, height, data };
+        // What is no block of UASTC is found here, where the file has a name.
+        if format == Format::Uastc {
+            basis::is_opaque(&level).map_err(|e| format!("level {i}: {e}"))?;
+        }
+        levels.push(level);
     }
 
     let mut metadata = BTreeMap::new();

@@ -24,6 +24,7 @@
 //! # Ok::<(), kinran_image::Error>(())
 //! ```
 
+mod basis;
 mod block;
 mod dds_file;
 mod error;

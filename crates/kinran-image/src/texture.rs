@@ -57,7 +57,7 @@ impl Texture {
         }
         if self.transfer == Transfer::Srgb && !self.format.has_srgb() {
             let name = self.format.name();
-            return fail(format!("{name} has no sRGB form; use linear, or bc1, bc7 or rgba8"));
+            return fail(format!("{name} has no sRGB form; use linear, or bc1, bc7, uastc or rgba8"));
         }
         for (i, level) in self.levels.iter().enumerate() {
             let wanted = (level_size(first.width, i), level_size(first.height, i));
@@ -112,7 +112,7 @@ impl Texture {
         }
         let texels = self.decode_level(0)?;
         let (channels, pixels) = match self.format {
-            Format::Bc1 | Format::Bc7 | Format::Rgba8 => {
+            Format::Bc1 | Format::Bc7 | Format::Uastc | Format::Rgba8 => {
                 // Exact: these decode to multiples of 1/255.
                 let bytes = texels.as_flattened().iter().map(|&x| (x * 255.0 + 0.5) as u8);
                 (Channels::Rgba, Pixels::U8(bytes.collect()))

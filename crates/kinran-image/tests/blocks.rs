@@ -4,16 +4,25 @@ use kinran_image::{Encoder, Encoding, Format, Preset, Role, decode, encode, enco
 use proptest::prelude::*;
 
 const PRESETS: [Preset; 3] = [Preset::Fast, Preset::Normal, Preset::Best];
-const BLOCK_FORMATS: [Format; 4] = [Format::Bc1, Format::Bc4, Format::Bc5, Format::Bc7];
+const BLOCK_FORMATS: [Format; 5] = [Format::Bc1, Format::Bc4, Format::Bc5, Format::Bc7, Format::Uastc];
 
 fn encoders() -> Vec<Encoder> {
     if cfg!(feature = "ispc") { vec![Encoder::Ispc, Encoder::Portable] } else { vec![Encoder::Portable] }
 }
 
+fn encoders_of(format: Format) -> Vec<Encoder> {
+    match format {
+        // It has one, whatever it is called.
+        Format::Uastc if cfg!(feature = "uastc") => vec![Encoder::Portable],
+        Format::Uastc => Vec::new(),
+        _ => encoders(),
+    }
+}
+
 fn all_encodings() -> Vec<Encoding> {
     let mut all = Vec::new();
     for format in BLOCK_FORMATS {
-        for encoder in encoders() {
+        for encoder in encoders_of(format) {
             all.extend(PRESETS.map(|preset| Encoding { format, encoder, preset }));
         }
     }
@@ -44,7 +53,7 @@ fn used_channels(format: Format) -> usize {
         Format::Bc4 => 1,
         Format::Bc5 => 2,
         Format::Bc1 => 3,
-        Format::Bc7 | Format::Rgba8 | Format::Rgba16F => 4,
+        Format::Bc7 | Format::Uastc | Format::Rgba8 | Format::Rgba16F => 4,
     }
 }
 
@@ -241,7 +250,7 @@ fn opaque_blocks_of_bc7_pay_with_their_colour() {
 fn better_presets_are_not_worse() {
     let texels = waves(128, 128, true);
     for format in BLOCK_FORMATS {
-        for encoder in encoders() {
+        for encoder in encoders_of(format) {
             let db = PRESETS.map(|preset| {
                 let data = encode(Encoding { format, encoder, preset }, &texels, 128, 128).unwrap();
                 psnr(format, &texels, &decode(format, &data, 128, 128).unwrap())

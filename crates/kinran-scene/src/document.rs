@@ -316,12 +316,18 @@ impl Document {
     /// A texture's PNG or JPEG image; where it has none, that of `EXT_texture_webp` or of an extension in
     /// [`TextureExtension`].
     pub fn texture_image(&self, texture: usize) -> Option<usize> {
-        let texture = array(&self.json, "textures").get(texture)?;
-        texture.get("source").and_then(index).or_else(|| {
-            let extensions = texture.get("extensions")?;
-            let names = [WEBP, TextureExtension::Ktx2.name(), TextureExtension::Dds.name()];
+        self.texture_source(texture).or_else(|| {
+            let extensions = array(&self.json, "textures").get(texture)?.get("extensions")?;
+            let names = [TextureExtension::Ktx2.name(), TextureExtension::Dds.name()];
             names.iter().find_map(|name| index(extensions.get(name)?.get("source")?))
         })
+    }
+
+    /// A texture's PNG or JPEG image; where it has none, that of `EXT_texture_webp`.
+    pub fn texture_source(&self, texture: usize) -> Option<usize> {
+        let texture = array(&self.json, "textures").get(texture)?;
+        let webp = || index(texture.get("extensions")?.get(WEBP)?.get("source")?);
+        texture.get("source").and_then(index).or_else(webp)
     }
 
     /// How a person would call an image: its file's name without folder and extension, or its `name`, or
@@ -631,13 +637,28 @@ impl Document {
         ranges
     }
 
-    /// Takes extensions that stood in the original and stand nowhere now from the lists of what is used and required.
+    /// Takes extensions that stood in the original and stand nowhere now from the lists of what is used and required, and,
+    /// where images were added, those of textures that all have a PNG or JPEG from the latter.
     fn drop_extensions(&self, json: &mut Object) {
         let used = used_extensions(json);
-        let gone = |name: &Value| {
-            name.as_str().is_some_and(|name| self.original_extensions.contains(name) && !used.contains(name))
+        let optional: Vec<&str> = [WEBP, TextureExtension::Ktx2.name(), TextureExtension::Dds.name()]
+            .into_iter()
+            .filter(|name| {
+                let is_there =
+                    |texture: &Value| texture.get("extensions").is_some_and(|e| e.get(name).is_some());
+                let textures = array(json, "textures").iter().filter(|texture| is_there(texture));
+                !self.added_images.is_empty()
+                    && textures.clone().all(|texture| texture.get("source").is_some())
+            })
+            .collect();
+        let is_gone = |name: &Value, list: &str| {
+            name.as_str().is_some_and(|name| {
+                self.original_extensions.contains(name) && !used.contains(name)
+                    || list == "extensionsRequired" && used.contains(name) && optional.contains(&name)
+            })
         };
         for list in ["extensionsUsed", "extensionsRequired"] {
+            let gone = |name: &Value| is_gone(name, list);
             if !array(json, list).iter().any(gone) {
                 continue;
             }

@@ -45,6 +45,15 @@ pub enum Container {
 }
 
 impl Container {
+    /// What messages and flags call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Container::Ktx2 => "ktx2",
+            Container::Dds => "dds",
+            Container::Both => "both",
+        }
+    }
+
     /// The file extensions written.
     pub fn extensions(self) -> &'static [&'static str] {
         match self {
@@ -102,18 +111,18 @@ pub struct TextureOptions {
     pub correlated: bool,
     /// Which colours keep their cut-out area from afar.
     pub alpha_coverage: AlphaCoverage,
-    /// File format.
-    pub container: Container,
+    /// File format; KTX2 by default, of glTF files what the target has.
+    pub container: Option<Container>,
     /// Zstandard level of KTX2 files, 0 for none to 22; 3 by default.
     pub zstd: i32,
-    /// Texel format of normal maps; BC5 by default. It needs two channels.
+    /// Texel format of normal maps; BC5 by default, of glTF files what the target has. It needs two channels.
     pub normal_format: Option<Format>,
     /// Texel format of aniso, anisotropy, roughness and packed maps; BC7 by default. It needs three channels.
     pub aniso_format: Option<Format>,
     /// Texel format of colour maps; BC7 by default. It needs three channels of 8 bits.
     pub color_format: Option<Format>,
-    /// Who compresses blocks; the default is measured for each kind of map. [`Encoder::Portable`] gives the same bytes on
-    /// every processor.
+    /// Who compresses blocks of BCn; the default is measured for each kind of map. [`Encoder::Portable`] gives the same bytes
+    /// on every processor, as does the encoder of UASTC.
     pub encoder: Option<Encoder>,
     /// Time spent on a block; the default is measured for each kind of map.
     pub preset: Option<Preset>,
@@ -126,7 +135,7 @@ impl Default for TextureOptions {
             kernel: Kernel::Box,
             correlated: true,
             alpha_coverage: AlphaCoverage::Masked,
-            container: Container::Ktx2,
+            container: None,
             zstd: 3,
             normal_format: None,
             aniso_format: None,
@@ -152,7 +161,9 @@ impl TextureOptions {
     pub fn encoding(&self, role: Role, format: Option<Format>) -> Encoding {
         let mut encoding = role.encoding();
         encoding.format = format.unwrap_or(encoding.format);
-        if let Some(encoder) = self.encoder {
+        if encoding.format == Format::Uastc {
+            (encoding.encoder, encoding.preset) = (Encoder::Portable, Preset::Normal);
+        } else if let Some(encoder) = self.encoder {
             (encoding.encoder, encoding.preset) = match encoder {
                 Encoder::Ispc => (encoder, Preset::Normal),
                 Encoder::Portable => (encoder, Preset::Fast),
@@ -184,12 +195,25 @@ impl TextureOptions {
             let (given, reason) = (self.zstd.to_string(), "levels are 0 to 22".into());
             return Err(Error::Option { option: "zstd", given, file: None, reason });
         }
+        let dds = self.container.unwrap_or_default() != Container::Ktx2;
         for (option, format, channels, reason) in [
             ("normal-format", self.normal_format, 2, "normal maps need red and green"),
             ("aniso-format", self.aniso_format, 3, "these maps need red, green and blue"),
             ("color-format", self.color_format, 3, "colour needs red, green and blue"),
         ] {
             let Some(format) = format else { continue };
+            if !format.has_encoder() {
+                let reason =
+                    "this build has no encoder for it; build with the feature `uastc`, or choose bc7";
+                return refused(option, format, reason.into());
+            }
+            if format == Format::Uastc && dds {
+                return refused(
+                    option,
+                    format,
+                    "DDS cannot hold it; choose bc7, or the container ktx2".into(),
+                );
+            }
             if format.channels() < channels {
                 return refused(option, format, format!("{reason}; choose bc7, bc1, rgba8 or rgba16f"));
             }
@@ -207,7 +231,12 @@ impl TextureOptions {
 
     /// The names of a texture's files.
     pub(crate) fn files(&self, name: &str) -> Vec<String> {
-        self.container.extensions().iter().map(|extension| format!("{name}.{extension}")).collect()
+        self.container
+            .unwrap_or_default()
+            .extensions()
+            .iter()
+            .map(|extension| format!("{name}.{extension}"))
+            .collect()
     }
 }
 

@@ -14,7 +14,7 @@ use kinran_image::{
 
 fn baked_maps() -> Memory {
     let mut how = FolderOptions::default();
-    (how.form, how.textures.container) = (Form::Both, Container::Both);
+    (how.form, how.textures.container) = (Form::Both, Some(Container::Both));
     how.textures.encoder = Some(Encoder::Portable);
     let (files, out) = (maps().into_iter().collect::<Memory>(), Memory::new());
     let understood = understand(&files, Path::new("cloth"), &how).unwrap();

@@ -55,7 +55,7 @@ fn names(files: &BTreeMap<PathBuf, Vec<u8>>) -> Vec<String> {
 
 fn bake_maps(files: &dyn Files, root: &Path, out: &dyn Sink, task: Task<'_>) -> Result<(), Error> {
     let mut how = FolderOptions::default();
-    (how.form, how.textures.container) = (Form::Both, Container::Both);
+    (how.form, how.textures.container) = (Form::Both, Some(Container::Both));
     how.textures.encoder = Some(Encoder::Portable);
     let input = root.join("cloth");
     let understood = understand(files, &input, &how)?;

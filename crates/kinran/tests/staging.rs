@@ -25,7 +25,7 @@ fn model() -> Memory {
 
 fn options(filter: Filter, container: Container) -> GltfOptions {
     let mut how = GltfOptions::default();
-    (how.textures.filter, how.textures.container) = (filter, container);
+    (how.textures.filter, how.textures.container) = (filter, Some(container));
     how.textures.encoder = Some(Encoder::Portable);
     how
 }

@@ -11,7 +11,7 @@ use std::path::Path;
 type Module = Vec<String>;
 
 /// Crates whose files are looked at.
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 10] = [
     "kinran",
     "kinran-bake",
     "kinran-cli",
@@ -20,6 +20,7 @@ const CRATES: [&str; 9] = [
     "kinran-scene",
     "kinran-shaders",
     "kinran-shading",
+    "kinran-uastc",
     "xtask",
 ];
 

@@ -1,7 +1,7 @@
 //! What each flag of `kinran bake` acts on. A flag that cannot act is refused by its name, and never swallowed.
 
 use kinran::bake::Which;
-use kinran::options::{AlphaCoverage, Container};
+use kinran::options::AlphaCoverage;
 use kinran_bake::aniso::Kernel;
 use kinran_bake::curvature::Method;
 use kinran_scene::Wrap;
@@ -49,7 +49,8 @@ pub(super) const FLAGS: [Flag; 44] = [
     flag("alpha-coverage", On::Any, |a| a.alpha_coverage != AlphaCoverage::Masked),
     flag("edges", On::Folder, |a| a.edges != Wrap::Repeat),
     flag("form", On::Any, |a| a.form.is_some()),
-    flag("container", On::Any, |a| a.container != Container::default()),
+    flag("target", On::Model, |a| a.target.is_some()),
+    flag("container", On::Any, |a| a.container.is_some()),
     flag("zstd", On::Any, |a| a.zstd != DEFAULT_ZSTD),
     flag("normal-format", On::Any, |a| a.normal_format.is_some()),
     flag("aniso-format", On::Any, |a| a.aniso_format.is_some()),

@@ -121,7 +121,8 @@ pub(super) fn options(manifest: &Manifest, job: &Job) -> Result<JobOptions, Mani
     }
     // Reports of a library do not say where their inputs are, which every machine has elsewhere.
     if job.kind == Kind::Mesh {
-        let mut how = args.gltf_options();
+        let settled = args.gltf_options().settled();
+        let mut how = settled.map_err(|e| manifest.error(&job.place, Error::from(e).to_string()))?;
         how.source = None;
         return Ok(JobOptions::Model(how));
     }

@@ -23,7 +23,7 @@ use kinran_scene::{
 use kinran_shading::DIELECTRIC_F0;
 use serde_json::Value;
 
-use super::gltf_options::GltfOptions;
+use super::gltf_options::{GltfOptions, Target};
 use super::together::{color_texture, together, why_apart};
 use super::{curvature, file_name, file_stem, mip_texels, put_texture};
 use crate::content::Content;
@@ -90,6 +90,7 @@ pub fn understand_gltf(
     how: &GltfOptions,
     task: Task<'_>,
 ) -> Result<Understood, Error> {
+    let how = &how.settled()?;
     let mut document = Document::open_in(files, input, &how.allow_outside)?;
     let (smoothed, mut files) = (Memory::new(), files);
     let mut idle = None;
@@ -135,7 +136,7 @@ pub fn understand_gltf(
 /// textures.
 ///
 /// Each baked texture keeps a PNG or JPEG of level 0 as the fallback that glTF wants: the original image, or,
-/// where a factor was baked in, a new one.
+/// where a factor was baked in or its size or its normals changed, a new one.
 ///
 /// # Errors
 /// Whatever is wrong with the model, the options or the destination. Files that were written before are whole and stay.
@@ -146,7 +147,7 @@ pub fn gltf(
     out: &dyn Sink,
     task: Task<'_>,
 ) -> Result<Report, Error> {
-    how.textures.check()?;
+    let how = &how.settled()?;
     how.curvature.check()?;
     let model = file_name(input);
     let own = files.place(input);
@@ -174,7 +175,7 @@ pub fn gltf(
     for turned in &plan.turned {
         turn_green(input, &mut document, turned, &mut written, out)?;
     }
-    bake_colors(how, &scene, &mut document, plan.colors, &mut report, out, task)?;
+    written.extend(bake_colors(how, &scene, &mut document, plan.colors, &mut report, out, task)?);
     let dumps = curvature::bake(input, how, &scene, &mut document, &mut report, out, task)?;
 
     for (i, material) in scene.materials.iter().enumerate().take(document.material_count()) {
@@ -226,6 +227,8 @@ struct Colored {
     transfer: Transfer,
     /// Of its alpha, where it is cut out.
     cutoff: Option<f32>,
+    /// Whether it is KTX2 or DDS alone, so that it gets a PNG.
+    has_no_source: bool,
     /// The surface whose metalness it is chosen together with.
     surface: Option<usize>,
     /// What came of that.
@@ -254,10 +257,18 @@ impl Plan {
         let surfaces = all.iter().map(|surface| {
             let material = &scene.materials[surface.materials[0]];
             let name = names.unique(&format!("{stem}_{}", file_stem(&material.name)));
-            (name, planned(scene, material, &surface.maps))
+            (name, planned(scene, document, surface.materials[0], &surface.maps))
         });
-        let surfaces = surfaces.collect();
+        let surfaces: Vec<(String, Vec<Planned>)> = surfaces.collect();
         let (mut colors, mut notes) = (Vec::<Colored>::new(), Vec::new());
+        for (surface, (_, planned)) in all.iter().zip(&surfaces) {
+            let (name, size) = (&scene.materials[surface.materials[0]].name, surface.maps.maps.size());
+            let loses =
+                |planned: &Planned| !how.keeps_levels(how.textures.of_sheet(planned.sheet).format, size);
+            if how.target() != Target::Plain && planned.iter().any(loses) {
+                notes.push(broken_blocks(&format!("the maps of material \"{name}\""), size));
+            }
+        }
         let materials = document.material_count().min(scene.materials.len());
         for material in (0..materials).filter(|_| how.all_textures) {
             let m = &scene.materials[material];
@@ -271,8 +282,20 @@ impl Plan {
                 (Slot::Occlusion, occlusion, Transfer::Linear),
             ] {
                 let surface = of_surface.filter(|_| slot == Slot::BaseColor);
-                let Some(place) = place.filter(|place| scene.images[place.image].is_some()) else { continue };
+                let Some(place) = place else { continue };
+                let Some(image) = &scene.images[place.image] else { continue };
+                let role = if transfer == Transfer::Srgb { Role::Color } else { Role::Data };
+                let format = how.textures.encoding(role, how.textures.color_format).format;
+                let size = (image.width, image.height);
+                if !how.keeps_levels(format, size) {
+                    let name = format!("image \"{}\"", document.image_name(place.image));
+                    let note = broken_blocks(&name, size);
+                    notes.extend((!notes.contains(&note)).then_some(note));
+                    continue;
+                }
                 let cutoff = how.textures.alpha_coverage.of_material(m).filter(|_| slot == Slot::BaseColor);
+                let texture = document.texture(material, slot);
+                let source = texture.and_then(|texture| document.texture_source(texture));
                 let is_it = |c: &&mut Colored| c.place == *place && c.transfer == transfer;
                 let known =
                     colors.iter_mut().filter(is_it).find(|c| (c.surface, c.cutoff) == (surface, cutoff));
@@ -284,6 +307,7 @@ impl Plan {
                             place: place.clone(),
                             transfer,
                             cutoff,
+                            has_no_source: source.is_none() && !matches!(image.pixels, Pixels::F32(_)),
                             surface,
                             chosen: None,
                             slots: vec![(material, slot)],
@@ -361,27 +385,45 @@ fn turn_green(
     Ok(())
 }
 
+/// What to say of maps without whole blocks.
+fn broken_blocks(what: &str, (width, height): (u32, u32)) -> String {
+    let whole = |side: u32| side.next_multiple_of(4);
+    format!(
+        "{what}: {width}x{height} texels are no whole blocks, which KTX2 in glTF wants, so that they get no levels but the \
+         viewer's; scale them to {}x{}, or bake with --target engine",
+        whole(width),
+        whole(height)
+    )
+}
+
 /// The sheets of a material's surface.
-fn planned(scene: &Scene, m: &Material, surface: &MaterialSurface) -> Vec<Planned> {
-    let has_image = m.metallic_roughness.as_ref().is_some_and(|place| scene.images[place.image].is_some());
+fn planned(scene: &Scene, document: &Document, material: usize, surface: &MaterialSurface) -> Vec<Planned> {
+    let (m, size) = (&scene.materials[material], surface.maps.size());
     let directed = matches!(surface.maps.roughness, RoughnessMaps::Khr { .. });
-    // Factors are baked into the textures; an image that showed level 0 without them is replaced.
+    // Factors are baked into the textures; what does not show level 0 without them is replaced, and so is what was KTX2 or
+    // DDS alone.
+    let shows = |slot: Slot, place: Option<&TextureRef>| {
+        let source = document.texture(material, slot).and_then(|texture| document.texture_source(texture));
+        let image = place.and_then(|place| scene.images[place.image].as_ref());
+        source.is_some() && image.is_some_and(|image| (image.width, image.height) == size)
+    };
     let mut planned = Vec::new();
-    if m.normal.is_some() {
-        let changed = m.normal_scale != 1.0 || surface.maps.normal.y_down;
+    if let Some(place) = &m.normal {
+        let laid = scene.images[place.image].as_deref().is_some_and(|image| below_surface(image).is_some());
+        let factors = m.normal_scale != 1.0 || surface.maps.normal.y_down;
+        let changed = factors || laid || !shows(Slot::Normal, Some(place));
         planned.push(Planned { sheet: Sheet::Normal, slot: Slot::Normal, changed });
     }
+    let roughness = m.metallic_roughness.as_ref();
     planned.push(Planned {
         sheet: if directed { Sheet::Roughness } else { Sheet::IsotropicRoughness },
         slot: Slot::MetallicRoughness,
-        changed: m.roughness_factor != 1.0 || !has_image,
+        changed: m.roughness_factor != 1.0 || !shows(Slot::MetallicRoughness, roughness),
     });
     if let Some(a) = m.anisotropy.as_ref().filter(|_| directed) {
-        planned.push(Planned {
-            sheet: Sheet::KhrAnisotropy,
-            slot: Slot::Anisotropy,
-            changed: a.strength != 1.0 || a.rotation != 0.0 || a.texture.is_none(),
-        });
+        let factors = a.strength != 1.0 || a.rotation != 0.0;
+        let changed = factors || !shows(Slot::Anisotropy, a.texture.as_ref());
+        planned.push(Planned { sheet: Sheet::KhrAnisotropy, slot: Slot::Anisotropy, changed });
     }
     planned
 }
@@ -391,11 +433,15 @@ fn planned(scene: &Scene, m: &Material, surface: &MaterialSurface) -> Vec<Planne
 /// # Errors
 /// Where the document cannot be read.
 pub fn gltf_space(files: &dyn Files, input: &Path, how: &GltfOptions) -> Result<Space, Error> {
+    let how = &how.settled()?;
     let document = Document::open_in(files, input, &how.allow_outside)?;
     let image = |material: usize, slot: Slot| document.texture_image(document.texture(material, slot)?);
     let size = |image: &usize| image_size_of(&document.image_bytes(*image).ok()?);
     let options = &how.textures;
-    let texture = |sheet: Sheet, size: (u32, u32)| options.space(options.of_sheet(sheet).format, size);
+    let texture = |format: Format, size: (u32, u32)| match how.keeps_levels(format, size) {
+        true => options.space(format, size),
+        false => Space::default(),
+    };
     let mut space = Space::default();
     // Materials that share their maps share their textures.
     let (mut surfaces, mut plain) = (BTreeSet::new(), BTreeSet::new());
@@ -417,7 +463,7 @@ pub fn gltf_space(files: &dyn Files, input: &Path, how: &GltfOptions) -> Result<
             ];
             let wanted = sheets.into_iter().filter(|(wanted, _)| *wanted);
             wanted.for_each(|(_, sheet)| {
-                space.add(texture(sheet, size));
+                space.add(texture(options.of_sheet(sheet).format, size));
                 // A PNG of level 0 beside it, where a factor is baked in.
                 let fallback =
                     if sheet == Sheet::Aniso { 0 } else { 3 * u64::from(size.0) * u64::from(size.1) };
@@ -431,7 +477,7 @@ pub fn gltf_space(files: &dyn Files, input: &Path, how: &GltfOptions) -> Result<
             let image = image(material, slot).filter(|image| maps[2] != Some(*image));
             if let Some(size) = image.filter(|&image| plain.insert(image)).as_ref().and_then(size) {
                 let role = if slot == Slot::Occlusion { Role::Data } else { Role::Color };
-                let texture = options.space(options.encoding(role, options.color_format).format, size);
+                let texture = texture(options.encoding(role, options.color_format).format, size);
                 space.add(texture);
                 if slot == Slot::BaseColor && how.separate_specular {
                     space.most += texture.most;
@@ -461,8 +507,11 @@ fn check(
         let size = surface.maps.maps.size();
         let mut add = |sheet: Sheet| {
             let name = format!("{name}_{}", Content::from(sheet).name());
-            names.extend(options.files(&name));
-            space.add(options.space(options.of_sheet(sheet).format, size));
+            let format = options.of_sheet(sheet).format;
+            if how.keeps_levels(format, size) {
+                names.extend(options.files(&name));
+                space.add(options.space(format, size));
+            }
             name
         };
         let replaced: Vec<String> =
@@ -481,6 +530,7 @@ fn check(
     }
     for color in &plan.colors {
         names.extend(options.files(&color.name));
+        names.extend(color.has_no_source.then(|| format!("{}.png", color.name)));
         if let Some(image) = &scene.images[color.place.image] {
             space.add(options.space(color.encoding(options).format, (image.width, image.height)));
         }
@@ -810,31 +860,35 @@ impl SurfaceBaker<'_> {
         let size = maps.size();
         let mr = m.metallic_roughness.as_ref().and_then(|place| self.scene.images[place.image].clone());
 
-        let mut requests: Vec<SheetRequest> = planned
-            .iter()
-            .map(|planned| {
-                let is_roughness = planned.slot == Slot::MetallicRoughness;
-                SheetRequest {
-                    sheet: planned.sheet,
-                    encoding: options.of_sheet(planned.sheet),
-                    packed_with: mr.as_deref().filter(|_| is_roughness),
-                }
-            })
-            .collect();
+        let keeps = |sheet: Sheet| self.how.keeps_levels(options.of_sheet(sheet).format, size);
+        let request = |encoding: Option<Encoding>| {
+            let mr = mr.as_deref();
+            move |planned: &Planned| SheetRequest {
+                sheet: planned.sheet,
+                encoding: encoding.unwrap_or_else(|| options.of_sheet(planned.sheet)),
+                packed_with: mr.filter(|_| planned.slot == Slot::MetallicRoughness),
+            }
+        };
         let plain = Encoding { format: Format::Rgba8, encoder: Encoder::Portable, preset: Preset::Fast };
-        let fallbacks: Vec<SheetRequest> = planned
-            .iter()
-            .zip(&requests)
-            .filter(|(planned, _)| planned.changed)
-            .map(|(_, request)| SheetRequest { encoding: plain, ..request.clone() })
-            .collect();
-        requests.extend(fallbacks);
-        if self.how.form.aniso() {
+        let kept = planned.iter().filter(|planned| keeps(planned.sheet)).map(request(None));
+        let shown = planned.iter().filter(|planned| planned.changed).map(request(Some(plain)));
+        let mut requests: Vec<SheetRequest> = kept.chain(shown).collect();
+        let aniso = self.how.form.aniso() && keeps(Sheet::Aniso);
+        if aniso {
             requests.push(SheetRequest {
                 sheet: Sheet::Aniso,
                 encoding: options.of_sheet(Sheet::Aniso),
                 packed_with: None,
             });
+        }
+        let mut report = SurfaceReport {
+            name: m.name.clone(),
+            inputs: inputs(self.scene, self.document, materials[0])?,
+            outputs: Vec::new(),
+            levels: Vec::new(),
+        };
+        if requests.is_empty() {
+            return Ok((report, color));
         }
 
         let filtering = self.task.begin(Stage::Filtering(options.filter), &m.name, mip_texels(size))?;
@@ -844,20 +898,20 @@ impl SurfaceBaker<'_> {
         drop(filtering);
         let writing = self.task.begin(Stage::Writing, &m.name, baked.textures.len() as u64)?;
 
-        let mut report = SurfaceReport {
-            name: m.name.clone(),
-            inputs: inputs(self.scene, self.document, materials[0])?,
-            outputs: Vec::new(),
-            levels: baked.levels,
-        };
+        report.levels = baked.levels;
         let mut textures = baked.textures;
-        let aniso = self.how.form.aniso().then(|| textures.pop()).flatten();
-        let mut fallback = textures.split_off(planned.len()).into_iter();
-        for (planned, texture) in planned.iter().zip(textures) {
+        let aniso = aniso.then(|| textures.pop()).flatten();
+        let kept: Vec<bool> = planned.iter().map(|planned| keeps(planned.sheet)).collect();
+        let mut fallback = textures.split_off(kept.iter().filter(|kept| **kept).count()).into_iter();
+        let mut textures = textures.into_iter();
+        for (planned, kept) in planned.iter().zip(kept) {
+            let texture = if kept { textures.next() } else { None };
             let image = if planned.changed { fallback.next() } else { None };
-            let written = 1 + u64::from(image.is_some());
-            report.outputs.extend(self.place(planned, texture, image, materials)?);
-            writing.tick(written)?;
+            let written = u64::from(texture.is_some()) + u64::from(image.is_some());
+            if written > 0 {
+                report.outputs.extend(self.place(planned, texture, image, materials)?);
+                writing.tick(written)?;
+            }
         }
         if let Some(aniso) = aniso {
             let name = format!("{}_aniso", self.name);
@@ -871,17 +925,18 @@ impl SurfaceBaker<'_> {
         Ok((report, color))
     }
 
-    /// Writes a texture and puts it into its slot of every material.
+    /// Writes a texture, its PNG or both, and puts them into their slot of every material.
     fn place(
         &mut self,
         planned: &Planned,
-        texture: Texture,
+        texture: Option<Texture>,
         fallback: Option<Texture>,
         materials: &[usize],
     ) -> Result<Vec<Output>, Error> {
         let map = Content::from(planned.sheet);
         let name = format!("{}_{}", self.name, map.name());
-        let outputs = put_texture(&self.how.textures, &name, map, texture, self.out)?;
+        let put = |texture| put_texture(&self.how.textures, &name, map, texture, self.out);
+        let outputs = texture.map(put).transpose()?.unwrap_or_default();
 
         let old = self.document.texture(materials[0], planned.slot);
         let source = match fallback {
@@ -892,7 +947,7 @@ impl SurfaceBaker<'_> {
                 self.written.push(WrittenFile::new(&file, &bytes));
                 Some(self.document.add_image_file(&file))
             }
-            None => old.and_then(|texture| self.document.texture_image(texture)),
+            None => old.and_then(|texture| self.document.texture_source(texture)),
         };
         let alternatives = alternatives(self.document, &outputs);
         let other = |slot: &Slot| self.document.texture(materials[0], *slot);
@@ -1048,7 +1103,8 @@ fn image_of(texture: &Texture) -> Result<Image, Error> {
     Ok(Image::new(level.width, level.height, Channels::Rgb, Pixels::U8(rgb))?)
 }
 
-/// Bakes the textures that need no filter of their own: base colour, emission, occlusion.
+/// Bakes the textures that need no filter of their own: base colour, emission, occlusion. Gives the files besides the
+/// textures.
 fn bake_colors(
     how: &GltfOptions,
     scene: &Scene,
@@ -1057,7 +1113,8 @@ fn bake_colors(
     report: &mut Report,
     out: &dyn Sink,
     task: Task<'_>,
-) -> Result<(), Error> {
+) -> Result<Vec<WrittenFile>, Error> {
+    let mut written = Vec::new();
     let image = |color: &Colored| scene.images[color.place.image].as_ref();
     let texels = colors.iter().filter_map(image).map(|image| mip_texels((image.width, image.height)));
     let averaging = task.begin(Stage::Colors, "", texels.sum())?;
@@ -1082,7 +1139,16 @@ fn bake_colors(
         let outputs = put_texture(&how.textures, &color.name, content, texture, out)?;
         let (material, slot) = color.slots[0];
         let old = document.texture(material, slot);
-        let source = old.and_then(|texture| document.texture_image(texture));
+        let source = match color.has_no_source {
+            true => {
+                let file = format!("{}.png", color.name);
+                let bytes = encode_png(image)?;
+                out.put(&file, &bytes)?;
+                written.push(WrittenFile::new(&file, &bytes));
+                Some(document.add_image_file(&file))
+            }
+            false => old.and_then(|texture| document.texture_source(texture)),
+        };
         let alternatives = alternatives(document, &outputs);
         let texture = document.add_texture(old, source, &alternatives);
         report.surfaces.push(SurfaceReport {
@@ -1095,5 +1161,5 @@ fn bake_colors(
             document.set_texture(material, slot, texture);
         }
     }
-    Ok(())
+    Ok(written)
 }

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use kinran_bake::curvature::{BLUR, Method};
 use kinran_bake::folder::Green;
+use kinran_image::{Encoder, Format};
 
 use crate::Error;
-use crate::options::{Form, TextureOptions};
+use crate::options::{Container, Form, TextureOptions};
 
 /// How a glTF file is baked.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +15,8 @@ use crate::options::{Form, TextureOptions};
 pub struct GltfOptions {
     /// How textures are filtered, compressed and stored.
     pub textures: TextureOptions,
+    /// Who is to read the textures; see [`GltfOptions::target`] for what holds where nothing is said.
+    pub target: Option<Target>,
     /// Which maps hold the lobe; glTF's own are always written. [`Form::Khr`] by default.
     pub form: Form,
     /// Whether base colour, emission and occlusion are baked too.
@@ -40,6 +43,7 @@ impl Default for GltfOptions {
     fn default() -> Self {
         GltfOptions {
             textures: TextureOptions::default(),
+            target: None,
             form: Form::Khr,
             all_textures: false,
             separate_specular: false,
@@ -49,6 +53,133 @@ impl Default for GltfOptions {
             curvature: CurvatureOptions::default(),
             estimate_normals: false,
             source: None,
+        }
+    }
+}
+
+/// Who is to read the textures of a glTF file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Target {
+    /// Every viewer: UASTC in KTX2, which is what `KHR_texture_basisu` allows, and a PNG of level 0; normals have three
+    /// channels.
+    Web,
+    /// Viewers that hand the blocks in a KTX2 file to a desktop's GPU, such as three.js from r184 on: BC7, normals in BC5, and
+    /// a PNG of level 0. The text of `KHR_texture_basisu` does not allow it.
+    #[default]
+    Desktop,
+    /// Engines: the same blocks in DDS, by `MSFT_texture_dds`, and a PNG of level 0, which viewers show.
+    Engine,
+    /// Whatever knows glTF and nothing else: a PNG of level 0 where factors are baked in; all other levels are the viewer's.
+    Plain,
+}
+
+impl Target {
+    /// What reports, messages and flags call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Target::Web => "web",
+            Target::Desktop => "desktop",
+            Target::Engine => "engine",
+            Target::Plain => "plain",
+        }
+    }
+}
+
+impl GltfOptions {
+    /// Who is to read the textures, where nothing says it: who reads the container and the formats that are asked for, else
+    /// [`Target::default`].
+    pub fn target(&self) -> Target {
+        let how = &self.textures;
+        let formats = [how.normal_format, how.aniso_format, how.color_format];
+        let native = formats.iter().flatten().any(|format| *format != Format::Uastc);
+        match (self.target, how.container) {
+            (Some(target), _) => target,
+            (None, Some(Container::Dds)) => Target::Engine,
+            (None, Some(Container::Both)) => Target::Desktop,
+            _ if native || how.encoder == Some(Encoder::Ispc) => Target::Desktop,
+            _ => Target::default(),
+        }
+    }
+
+    /// The options with the target, and with the formats and the container of the target where nothing was said of them.
+    ///
+    /// # Errors
+    /// [`Error::Option`] that names an option out of its range, or one that the target contradicts.
+    pub fn settled(&self) -> Result<GltfOptions, Error> {
+        let (target, mut how) = (self.target(), self.clone());
+        let textures = &mut how.textures;
+        let refused = |option, given: &str, reason: &str| {
+            let reason = format!("{reason}, which is not what the target {} is for", target.name());
+            Err(Error::Option { option, given: given.into(), file: None, reason })
+        };
+        let formats = [
+            ("normal-format", &mut textures.normal_format),
+            ("aniso-format", &mut textures.aniso_format),
+            ("color-format", &mut textures.color_format),
+        ];
+        match target {
+            Target::Web => {
+                if !Format::Uastc.has_encoder() {
+                    let reason = "this build has no encoder for UASTC; build with the feature `uastc`, or choose desktop";
+                    let (given, reason) = (target.name().into(), reason.into());
+                    return Err(Error::Option { option: "target", given, file: None, reason });
+                }
+                if let Some(container @ (Container::Dds | Container::Both)) = textures.container {
+                    return refused("container", container.name(), "most viewers read no DDS");
+                }
+                for (option, format) in formats {
+                    if *format.get_or_insert(Format::Uastc) != Format::Uastc {
+                        let given = format.unwrap_or(Format::Uastc).name();
+                        return refused(option, given, "most viewers read nothing in KTX2 but uastc");
+                    }
+                }
+                if textures.encoder == Some(Encoder::Ispc) {
+                    return refused("encoder", "ispc", "it has blocks of BCn alone");
+                }
+                textures.container = Some(Container::Ktx2);
+            }
+            Target::Desktop => {
+                if textures.container == Some(Container::Dds) {
+                    return refused("container", "dds", "viewers read no DDS");
+                }
+                textures.container.get_or_insert(Container::Ktx2);
+            }
+            Target::Engine => {
+                if textures.container == Some(Container::Ktx2) {
+                    return refused("container", "ktx2", "its DDS would be missing");
+                }
+                textures.container.get_or_insert(Container::Dds);
+            }
+            Target::Plain => {
+                if let Some(container) = textures.container {
+                    return refused("container", container.name(), "it is about files with levels");
+                }
+                if let Some((option, format)) = formats.into_iter().find(|(_, format)| format.is_some()) {
+                    let given = format.map_or("", Format::name);
+                    return refused(option, given, "it is about files with levels");
+                }
+                if self.form.aniso() {
+                    let name = if self.form == Form::Aniso { "aniso" } else { "both" };
+                    return refused("form", name, "the aniso map lives by its levels");
+                }
+                if self.all_textures {
+                    return refused("all-textures", "", "it is about levels of colours");
+                }
+            }
+        }
+        how.textures.check()?;
+        how.target = Some(target);
+        Ok(how)
+    }
+
+    /// Whether a texture is stored with its levels, or as a PNG alone. `KHR_texture_basisu` and WebGL want whole blocks on
+    /// level 0.
+    pub(crate) fn keeps_levels(&self, format: Format, (width, height): (u32, u32)) -> bool {
+        let side = format.block_side();
+        match self.target() {
+            Target::Web | Target::Desktop => width.is_multiple_of(side) && height.is_multiple_of(side),
+            Target::Engine => true,
+            Target::Plain => false,
         }
     }
 }

@@ -20,13 +20,13 @@ pub use kinran_bake::folder::{Folder, FolderError, Green, Hints, Role, Row};
 pub use curvature::{Joined, measured, meshes, pose_scale, triangles_of, unit};
 pub use folder::{FolderOptions, folder, folder_plan, understand};
 pub use gltf::{Understood, gltf, gltf_space, texel_remarks, understand_gltf};
-pub use gltf_options::{CurvatureOptions, Dump, GltfOptions, Which};
+pub use gltf_options::{CurvatureOptions, Dump, GltfOptions, Target, Which};
 pub use together::{Together, together, why_apart};
 
 impl TextureOptions {
     /// The space of a texture's files.
     fn space(&self, format: Format, size: (u32, u32)) -> Space {
-        Space::of_texture(self.container, self.zstd, format, size)
+        Space::of_texture(self.container.unwrap_or_default(), self.zstd, format, size)
     }
 }
 
@@ -45,7 +45,7 @@ pub(crate) fn put_texture(
     out: &dyn Sink,
 ) -> Result<Vec<Output>, Error> {
     texture.metadata.insert("KinranFilter".into(), how.filter.name().into());
-    textures::put_texture(how.container, how.zstd, name, map, texture, out)
+    textures::put_texture(how.container.unwrap_or_default(), how.zstd, name, map, texture, out)
 }
 
 /// A name that is a file's on every system: what is not a letter, digit, dash, dot or underscore becomes `_`.

@@ -103,7 +103,7 @@ impl Plan {
         };
         match &self.how {
             JobOptions::Folder(how) => of_bake(&how.textures),
-            JobOptions::Model(how) => of_bake(&how.textures),
+            JobOptions::Model(how) => how.settled().map_or_else(|_| Vec::new(), |how| of_bake(&how.textures)),
             JobOptions::Detail(how) => how.encodings(&self.job.input),
             JobOptions::Skin(_) => Vec::new(),
         }
