@@ -332,7 +332,7 @@ fn a_specular_colour_does_not_bring_both_colours_back() {
 fn a_specular_colour_is_not_as_authored_up_close_or_lies_elsewhere() {
     let (out, _) = bake_paint("", |how| {
         how.separate_specular = true;
-        how.textures.container = Container::Both;
+        how.textures.container = Some(Container::Both);
     });
     let scene = Scene::load_in(&out, Path::new("model.gltf"), &[], &Needs::ALL, &|_| {}, &untold).unwrap();
     let m = &scene.materials[0];

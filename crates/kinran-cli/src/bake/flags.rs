@@ -41,7 +41,7 @@ const fn flag(name: &'static str, on: On, given: fn(&Args) -> bool) -> Flag {
 }
 
 /// Every flag, in the order of `kinran bake --help`.
-pub(super) const FLAGS: [Flag; 44] = [
+pub(super) const FLAGS: [Flag; 45] = [
     flag("output", On::Run, |a| a.output.is_some()),
     flag("filter", On::Any, |a| a.filter.name() != "ml"),
     flag("kernel", On::Any, |a| a.kernel != Kernel::default()),

@@ -625,13 +625,16 @@ fn surfaces(
                     key.color = Some(Key::of_color(&scene.materials[material], &how.textures));
                 }
                 // A base colour that stays as it is gets its levels from the viewer.
-                reflectance = reflectance.filter(|_| how.all_textures && maps.maps.weights.is_some());
+                let color = how.textures.encoding(Role::Color, how.textures.color_format).format;
+                let is_baked = how.all_textures && how.keeps_levels(color, size);
+                reflectance = reflectance.filter(|_| is_baked && maps.maps.weights.is_some());
                 let mut specular = None;
                 if let Some(reflectance) = &reflectance {
                     let m = &scene.materials[material];
                     let name = format!("material \"{}\"", m.name);
                     warnings.extend(why_apart(&name, reflectance, &maps.maps));
-                    specular = specular_size(reflectance, size).filter(|_| how.separate_specular);
+                    specular = specular_size(reflectance, size)
+                        .filter(|&size| how.separate_specular && how.keeps_levels(color, size));
                     if specular.is_some() && m.dielectric.is_some() {
                         warnings.push(format!(
                             "{name}: no specular colour is chosen for it, since KHR_materials_specular or KHR_materials_ior says what reflects"
