@@ -307,6 +307,12 @@ pub fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let pictures =
         series.flat_map(|name| args.distances.iter().map(move |distance| picture_file(name, *distance)));
     let pictures = pictures.chain(["compare.png".into(), "distance.png".into()]);
+    let numbers = output.join("compare.json");
+    if !args.view.force && std::fs::read(&numbers).is_ok_and(|text| !is_comparison(&text)) {
+        let reason =
+            "kinran did not write this file; name another folder with --output, or overwrite it with --force";
+        return Err(Error::file_error(&numbers, reason));
+    }
     args.view.refuse_inputs(&args.file, pictures.map(|picture| output.join(picture)))?;
     if let Some(method) = repeated(&args.filters) {
         let reason = format!("names {} twice; name each once", method.name());
@@ -349,6 +355,12 @@ const NO_MAPS: &str = "no material has a normal, roughness or anisotropy map: th
 /// The name of a picture of a filter or of ground truth.
 pub(crate) fn picture_file(series: &str, distance: f32) -> String {
     format!("{series}_x{distance}.png")
+}
+
+/// Whether a text is the numbers of a comparison.
+fn is_comparison(text: &[u8]) -> bool {
+    let json: Option<serde_json::Value> = serde_json::from_slice(text).ok();
+    json.is_some_and(|json| ["methods", "findings"].iter().all(|member| json.get(member).is_some()))
 }
 
 /// The first value that stands there again.

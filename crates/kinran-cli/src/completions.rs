@@ -87,7 +87,14 @@ fn page(man: &Man) -> Result<Vec<u8>, Error> {
 fn write_pages(command: &Command, folder: &Path, files: &mut Vec<String>) -> Result<(), Error> {
     let man = Man::new(command.clone());
     let file = man.get_filename();
-    write_atomically(&folder.join(&file), &page(&man)?)?;
+    let path = folder.join(&file);
+    let is_ours = |text: Vec<u8>| String::from_utf8_lossy(&text).contains(".TH kinran");
+    if std::fs::read(&path).is_ok_and(|text| !is_ours(text)) {
+        let reason =
+            "is a page that kinran did not write; move it away, or name another folder with --output";
+        return Err(Error::file_error(&path, reason));
+    }
+    write_atomically(&path, &page(&man)?)?;
     files.push(file);
     let mut inner = command.get_subcommands().filter(|command| command.get_name() != "help");
     inner.try_for_each(|command| write_pages(command, folder, files))

@@ -262,7 +262,10 @@ pub(crate) fn refuse_foreign(folder: &Path, files: &[String], force: bool) -> Re
         let ours = if is_report(file) {
             read_report(&path).is_some()
         } else {
-            let known = known.get_or_insert_with(|| known_files(folder));
+            // What another report names is another model's, or another material's.
+            let known = known.get_or_insert_with(|| {
+                reported(files.iter().filter(|file| is_report(file)).map(|file| folder.join(file)))
+            });
             known.contains(&written_file(folder, file)?)
         };
         if !ours {
@@ -335,7 +338,11 @@ pub(crate) fn written_in(folder: &Path) -> BTreeSet<PathBuf> {
 /// What the reports in a folder name.
 fn known_files(folder: &Path) -> BTreeSet<WrittenFile> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let reports = entries.map(|e| e.path()).filter(|path| is_report(&path.to_string_lossy()));
+    reported(entries.map(|e| e.path()).filter(|path| is_report(&path.to_string_lossy())))
+}
+
+/// What these reports name.
+fn reported(reports: impl Iterator<Item = PathBuf>) -> BTreeSet<WrittenFile> {
     reports.filter_map(|path| read_report(&path)).flat_map(KnownFiles::files).collect()
 }
 
@@ -449,8 +456,9 @@ mod tests {
         let report = serde_json::json!({ "written": [written_file(folder.path(), "a.ktx2").unwrap()] });
         write("m.kinran.json", &report.to_string());
         refused(&["a.ktx2", "m.kinran.json"], false).unwrap();
+        assert!(refused(&["a.ktx2", "other.kinran.json"], false).unwrap_err().contains("a.ktx2"));
         write("a.ktx2", "b");
-        assert!(refused(&["a.ktx2"], false).unwrap_err().contains("a.ktx2"));
+        assert!(refused(&["a.ktx2", "m.kinran.json"], false).unwrap_err().contains("a.ktx2"));
         write("m.kinran.json", "{ \"notes\": \"mine\" }");
         assert!(refused(&["m.kinran.json"], false).unwrap_err().contains("m.kinran.json"));
         let other =

@@ -137,7 +137,10 @@ fn table_size(text: &str) -> Result<(u32, u32), String> {
 }
 
 /// Draws tables as a PNG.
-pub(crate) fn draw(tables: &Tables) -> Result<Vec<u8>, kinran::Error> {
+///
+/// # Errors
+/// Those of the encoder.
+pub fn draw(tables: &Tables) -> Result<Vec<u8>, kinran::Error> {
     let title = format!("{}, {}", tables.name, tables.profile);
     Ok(plot::plot(&title, &tables.punctual, &tables.ambient, tables.range).encode()?)
 }

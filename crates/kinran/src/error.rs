@@ -171,6 +171,9 @@ pub enum InputFault {
     /// It lies where the output goes.
     #[error("lies among the inputs and would be overwritten; choose another `output`")]
     AmongInputs,
+    /// A file where one is to be written, which no earlier run put there.
+    #[error("kinran did not write this file; move it away, or name another output")]
+    Foreign,
     /// It is called JSON and is none.
     #[error("is no JSON: {0}; make it again")]
     NoJson(String),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use kinran_image::{Channels, Image, Pixels, encode_png, read_texture};
+use kinran_image::{Channels, Image, Pixels, encode_png, read_texture, write_png};
 use serde_json::{Value, json};
 
 use crate::common::{bumps, files, glb, kinran, kinran_json, refused, square, text};
@@ -556,4 +556,71 @@ fn a_library_fills_the_disk_before_it_says_so() {
     assert!(files(folder.path()).iter().all(|name| name != "cache"), "something was kept");
     let written = if out.exists() { files(&out) } else { Vec::new() };
     assert!(written.iter().all(|name| name == ".kinran"), "{written:?}");
+}
+
+/// A report speaks for its own files: what another model brought along is not overwritten under the same name.
+#[test]
+fn a_texture_of_another_model_is_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let path = |name: &str| folder.path().join(name);
+    let model = |name: &str, value: u8| {
+        std::fs::create_dir(path(name)).unwrap();
+        let grey = Image::new(4, 4, Channels::R, Pixels::U8(vec![value; 16])).unwrap();
+        write_png(&path(name).join("base.png"), &grey).unwrap();
+        let json = r#"{"asset":{"version":"2.0"},"images":[{"uri":"base.png"}],"textures":[{"source":0}],
+            "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}]}"#;
+        let file = path(name).join(format!("{name}.gltf"));
+        std::fs::write(&file, json).unwrap();
+        file
+    };
+    let (lamp, chair) = (model("lamp", 20), model("chair", 200));
+    kinran_json(&["bake", text(&lamp), "-o", text(&out)]);
+    let before = std::fs::read(out.join("base.png")).unwrap();
+    refused(&["bake", text(&chair), "-o", text(&out)], &["base.png", "did not write this file"]);
+    assert_eq!(std::fs::read(out.join("base.png")).unwrap(), before);
+    // Its own it writes again, and a file that is the same is shared.
+    kinran_json(&["bake", text(&lamp), "-o", text(&out)]);
+    std::fs::copy(path("lamp/base.png"), path("chair/base.png")).unwrap();
+    kinran_json(&["bake", text(&chair), "-o", text(&out)]);
+}
+
+#[test]
+fn a_file_in_the_way_of_a_library_a_comparison_or_a_page_is_lost() {
+    let maps = maps();
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let manifest = path("kinran.toml");
+    std::fs::write(&manifest, format!("[[aniso]]\ninput = '{}'\n", text(maps.path()))).unwrap();
+    let cache = path("cache");
+    let bake = ["bake", text(&manifest), "--cache", text(&cache), "--json"];
+    let report = kinran_json(&bake[..4]);
+    let entry = path("baked").join(report["entries"][0]["folder"].as_str().unwrap());
+    let name = report["entries"][0]["files"][0]["name"].as_str().unwrap();
+    // As somebody has it who put a file there before, with a cache and without.
+    for keep_cache in [true, false] {
+        std::fs::remove_dir_all(path("baked")).unwrap();
+        if !keep_cache {
+            std::fs::remove_dir_all(&cache).unwrap();
+        }
+        std::fs::create_dir_all(&entry).unwrap();
+        std::fs::write(entry.join(name), "mine").unwrap();
+        let said = kinran(&bake);
+        assert!(
+            said.code == Some(2) && said.out.contains("did not write this file"),
+            "{}{}",
+            said.out,
+            said.err
+        );
+        assert_eq!(std::fs::read(entry.join(name)).unwrap(), b"mine");
+    }
+
+    let models = Models::new();
+    models.set("m.bin", "n.png");
+    let out = path("numbers");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("compare.json"), "{}").unwrap();
+    refused(&["compare", &models.text("model/m.gltf"), "-o", text(&out)], &["compare.json", "--force"]);
+    std::fs::write(out.join("kinran.1"), "mine").unwrap();
+    refused(&["man", "-o", text(&out)], &["kinran.1", "did not write"]);
 }

@@ -252,6 +252,15 @@ impl Library {
         report: &mut EntryReport,
     ) -> Result<Option<usize>, Error> {
         let folder = self.output.join(&job.folder);
+        let known = lock(&self.standing).get(&job.folder).cloned().unwrap_or_default();
+        for file in &entry.files {
+            let path = folder.join(&file.name);
+            let is_ours = known.files.iter().any(|(known, _)| known.name == file.name);
+            if !is_ours && path.exists() && !is_already(&path, file) {
+                refuse_input(job, &path)?;
+                return Err(Error::Input { path, fault: InputFault::Foreign });
+            }
+        }
         let scratch = WorkFolder::new(&self.state())?;
         let (mut files, mut copied) = (Vec::new(), 0);
         for file in &entry.files {
