@@ -193,7 +193,7 @@ fn alpha_passes_through() {
         assert_eq!(s[3], t[3]);
     }
     let error = solve(&target, &[Layer::new(&tile)], &options(BC1), &untold).unwrap_err().to_string();
-    assert!(error.contains("alpha") && error.contains("BC7"), "{error}");
+    assert!(error.contains("alpha") && error.contains("bc7"), "{error}");
 }
 
 #[test]
@@ -291,7 +291,7 @@ fn what_cannot_be_meant_is_refused() {
         ("1 to 3 layers, got 4", vec![base; 4]),
         ("layer 2 has no mask", vec![base, base]),
         ("layer 1 lies at the bottom", vec![Layer { mask: Some(mask), ..base }]),
-        ("layer 1 holds Data, but the target is Color", vec![Layer::new(&data)]),
+        ("layer 1 holds data, but the target is color", vec![Layer::new(&data)]),
         ("a mask is one channel", vec![base, Layer { mask: Some(Mask { map: &color, ..mask }), ..base }]),
         (
             "scale must be finite and not zero",

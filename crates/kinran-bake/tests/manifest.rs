@@ -40,7 +40,7 @@ fn a_mistake_is_told_without_its_place_or_what_was_expected() {
     for (text, line, column, expected) in [
         ("output = \n", 1, 10, "this is not TOML"),
         ("[[aniso]\n", 1, 9, "this is not TOML"),
-        ("ouput = \"x\"\n", 1, 1, "unknown key `ouput`; expected output, cache"),
+        ("ouput = \"x\"\n", 1, 1, "unknown key `ouput`; did you mean `output`? expected output, cache"),
         ("# héllo\noutput = 3\n", 2, 10, "expected a string, found an integer"),
         ("cache-limit = \"much\"\n", 1, 15, "much is no size; write a number and a unit, such as 10 GiB"),
         ("cache-limit = \"20\"\n", 1, 15, "20 is no size; write a number and a unit, such as 10 GiB"),

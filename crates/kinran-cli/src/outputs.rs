@@ -247,7 +247,7 @@ fn is_report(file: &str) -> bool {
 /// # Errors
 /// [`Error::File`]; also for a folder in the place of a file, which `force` does not help.
 pub(crate) fn refuse_foreign(folder: &Path, files: &[String], force: bool) -> Result<(), Error> {
-    let mut known: Option<BTreeSet<WrittenFile>> = None;
+    let mut own: Option<BTreeSet<WrittenFile>> = None;
     // A report that is none explains why nothing else is known.
     let (reports, others): (Vec<&String>, Vec<&String>) = files.iter().partition(|file| is_report(file));
     for file in reports.into_iter().chain(others) {
@@ -262,11 +262,13 @@ pub(crate) fn refuse_foreign(folder: &Path, files: &[String], force: bool) -> Re
         let ours = if is_report(file) {
             read_report(&path).is_some()
         } else {
-            // What another report names is another model's, or another material's.
-            let known = known.get_or_insert_with(|| {
+            let written = written_file(folder, file)?;
+            // What another report names is another model's, or another material's; but models themselves go from hand to
+            // hand, from a bake to a solution of their detail maps.
+            let own = own.get_or_insert_with(|| {
                 reported(files.iter().filter(|file| is_report(file)).map(|file| folder.join(file)))
             });
-            known.contains(&written_file(folder, file)?)
+            own.contains(&written) || (kinran_scene::is_gltf(&path) && known_files(folder).contains(&written))
         };
         if !ours {
             let reason = "kinran did not write this file, or it was changed since; move it away, name another folder \

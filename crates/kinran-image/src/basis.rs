@@ -8,8 +8,7 @@ use basisu::{DecodeFlags, TargetFormat, Transcoder};
 use rayon::prelude::*;
 
 use crate::image::MAX_IMAGE_BYTES;
-use crate::texture::level_size;
-use crate::{Error, Format, Level, Transfer};
+use crate::{Error, Format, Transfer};
 
 /// The two texel formats of Basis Universal that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,13 +46,13 @@ pub(crate) fn decode_blocks(blocks: &[u8], width: u32, texels: &mut [[f32; 4]]) 
     Ok(())
 }
 
-/// Whether a level's texels are all opaque; an error where a block is none of UASTC.
-pub(crate) fn is_opaque(level: &Level) -> Result<bool, String> {
-    let row_bytes = level.width.div_ceil(4) as usize * 16;
-    let strips = level.data.par_chunks(row_bytes * DECODED_ROWS);
+/// Whether all texels of blocks, rows of `width` texels, are opaque; an error where a block is none of UASTC.
+pub(crate) fn is_opaque(blocks: &[u8], width: u32) -> Result<bool, String> {
+    let row_bytes = width.div_ceil(4) as usize * 16;
+    let strips = blocks.par_chunks(row_bytes * DECODED_ROWS);
     let opaque = strips.map(|blocks| {
         let height = (blocks.len() / row_bytes * 4) as u32;
-        let decoded = rgba8(blocks, level.width, height)?;
+        let decoded = rgba8(blocks, width, height)?;
         Ok(decoded.as_chunks::<4>().0.iter().all(|texel| texel[3] == 255))
     });
     opaque.try_reduce(|| true, |a, b| Ok(a && b))
@@ -110,7 +109,7 @@ pub(crate) fn descriptor(transfer: Transfer, alpha: bool) -> [u8; 40] {
 pub(crate) fn described(file: &[u8], offset: usize) -> Result<(Kind, Transfer), String> {
     let descriptor = file.get(offset..).and_then(<[u8]>::first_chunk::<16>);
     let Some([.., model, _, function, _]) = descriptor else {
-        return Err("the file ends too early, it is truncated".into());
+        return Err(crate::error::TRUNCATED.into());
     };
     let transfer = if *function == 2 { Transfer::Srgb } else { Transfer::Linear };
     match *model {
@@ -122,23 +121,22 @@ pub(crate) fn described(file: &[u8], offset: usize) -> Result<(Kind, Transfer), 
     }
 }
 
-/// The levels of an ETC1S file, as RGBA of 8 bits.
+/// The texels of each level of an ETC1S file, as RGBA of 8 bits.
 pub(crate) fn decode_etc1s(
     file: &[u8],
     width: u32,
     height: u32,
     levels: usize,
-) -> Result<Vec<Level>, String> {
+) -> Result<Vec<Vec<u8>>, String> {
     if u64::from(width) * u64::from(height) * 4 > MAX_IMAGE_BYTES {
         return Err(format!("{width}x{height} texels of ETC1S are too many"));
     }
     let damaged = "the file is damaged, or of a kind of ETC1S that is not read";
     let transcoder = Transcoder::new(file).map_err(|_| damaged)?;
     let level = |level: usize| {
-        let data = transcoder
+        transcoder
             .transcode(level as u32, TargetFormat::Rgba32, DecodeFlags::NONE)
-            .map_err(|_| format!("level {level}: {damaged}"))?;
-        Ok(Level { width: level_size(width, level), height: level_size(height, level), data })
+            .map_err(|_| format!("level {level}: {damaged}"))
     };
     (0..levels).map(level).collect()
 }

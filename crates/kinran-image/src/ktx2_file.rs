@@ -108,7 +108,7 @@ pub fn encode_ktx2(texture: &Texture, zstd: Option<i32>) -> Result<Vec<u8>, Erro
 fn is_opaque(texture: &Texture) -> Result<bool, Error> {
     let mut opaque = true;
     for level in &texture.levels {
-        opaque &= basis::is_opaque(level).map_err(Error::Unsupported)?;
+        opaque &= basis::is_opaque(&level.data, level.width).map_err(Error::Unsupported)?;
     }
     Ok(opaque)
 }
@@ -198,7 +198,10 @@ fn parse(bytes: &[u8]) -> Result<Texture, String> {
     };
     let mut levels = Vec::with_capacity(level_count);
     if is_basis_lz {
-        levels = basis::decode_etc1s(bytes, width, height, level_count)?;
+        let texels = basis::decode_etc1s(bytes, width, height, level_count)?.into_iter().enumerate();
+        levels = texels
+            .map(|(i, data)| Level { width: level_size(width, i), height: level_size(height, i), data })
+            .collect();
     }
     let (index, _) = rest.as_chunks::<{ LevelIndex::LENGTH }>();
     for (i, entry) in index.get(..level_count).ok_or_else(truncated)?.iter().enumerate().skip(levels.len()) {
@@ -216,7 +219,7 @@ fn parse(bytes: &[u8]) -> Result<Texture, String> {
         let level = Level { width, height, data };
         // What is no block of UASTC is found here, where the file has a name.
         if format == Format::Uastc {
-            basis::is_opaque(&level).map_err(|e| format!("level {i}: {e}"))?;
+            basis::is_opaque(&level.data, level.width).map_err(|e| format!("level {i}: {e}"))?;
         }
         levels.push(level);
     }

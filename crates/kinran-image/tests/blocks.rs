@@ -319,8 +319,10 @@ proptest! {
     #[test]
     fn no_block_of_bytes_is_beyond_the_decoder(data: [u8; 16]) {
         for format in BLOCK_FORMATS {
-            let texels = decode(format, &data[..format.block_bytes()], 4, 4).unwrap();
-            for t in texels {
+            let texels = decode(format, &data[..format.block_bytes()], 4, 4);
+            // Some blocks are none of UASTC, which its decoder tells.
+            prop_assert!(texels.is_ok() || format == Format::Uastc, "{:?}: {:?}", format, texels);
+            for t in texels.into_iter().flatten() {
                 prop_assert!(t.iter().all(|s| (0.0..=1.0).contains(s)), "{:?}: {:?}", format, t);
             }
         }
