@@ -450,7 +450,7 @@ fn what_cannot_be_meant_is_refused() {
     solve(&[&layer(",scal=2")], &["scal=2", "scale, rotation"]);
     solve(&[&layer(""), &layer("")], &["layer 2 has no mask"]);
     solve(&[&layer(",mask=nowhere.png")], &["nowhere.png"]);
-    solve(&[&layer(""), "--format", "bc5"], &["Bc5", "Color"]);
+    solve(&[&layer(""), "--format", "bc5"], &["bc5", "color"]);
     solve(&[&layer(""), "--alpha", "2"], &["--alpha", "0 to 1"]);
     solve(&[&layer(",opacity=0.5"), "--kind", "aniso"], &["aniso", "alpha"]);
     solve(&[&layer(""), "--material", "x"], &["--model"]);
