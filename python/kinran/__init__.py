@@ -301,8 +301,11 @@ def decode_texture(file, *, name="texture.ktx2"):
     """
     if not isinstance(file, (bytes, bytearray, memoryview)):
         name = _os.fspath(file)
-        with open(name, "rb") as stream:
-            file = stream.read()
+        try:
+            with open(name, "rb") as stream:
+                file = stream.read()
+        except OSError as error:
+            raise FileError.of(name, error) from error
     levels, form, transfer, keys = _kinran.decode_levels(name, bytes(file))
     levels = [flat.reshape(height, width, 4) for flat, width, height, _ in levels]
     return Texture(levels, form, transfer, dict(keys))

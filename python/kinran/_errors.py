@@ -33,6 +33,13 @@ class InputError(KinranError, ValueError):
 class FileError(InputError, OSError):
     """A file could not be read or written."""
 
+    @classmethod
+    def of(cls, name, error):
+        """The exception for a file that Python could not read."""
+        wrong = cls(f"{name}: {error.strerror}")
+        wrong.code, wrong.file = "io", name
+        return wrong
+
     def __str__(self):
         # OSError makes a pair of numbers and words of what it is given.
         return str(self.args[0])
@@ -61,7 +68,9 @@ def in_python(message):
             return f'{python}="{value}"'
         return python + (f" {value}" if value else "")
 
-    return re.sub(r"(?<![\w-])--([a-z][a-z-]*)(?:[ =]([\w./=-]+))?", option, message)
+    message = re.sub(r"(?<![\w-])--([a-z][a-z-]*)(?:[ =]([\w./=-]+))?", option, message)
+    # How the command line calls a value says nothing here.
+    return re.sub(r"'(\w+) <[^>]*>'", r"`\1`", message)
 
 
 def of(text):

@@ -50,8 +50,11 @@ def test_what_is_wrong_is_told_in_python_s_words(folder, tmp_path, model):
     assert caught.value.file.endswith("nope.glb") and isinstance(caught.value, OSError)
     with pytest.raises(kinran.InputError):
         kinran.bake(b"not a model", name="x.glb")
-    with pytest.raises(kinran.InputError, match="filter"):
+    with pytest.raises(kinran.InputError, match="invalid value 'best' for `filter`"):
         kinran.bake(folder, tmp_path / "out", filter="best")
+    with pytest.raises(kinran.FileError, match="nope.ktx2: No such file") as caught:
+        kinran.decode_texture(tmp_path / "nope.ktx2")
+    assert caught.value.code == "io" and caught.value.file.endswith("nope.ktx2")
     with pytest.raises(TypeError, match="needs an output"):
         kinran.bake(folder)
     assert not (tmp_path / "out").exists()
@@ -124,6 +127,20 @@ def test_other_threads_wait_for_a_bake(folder, tmp_path):
     done.set()
     counter.join()
     assert len(ran) > before
+
+
+def test_two_bakes_at_once_are_not_those_of_one_by_one(model):
+    data, files = model
+    alone = kinran.bake(data, name="lamp.gltf", files=files)[1]
+    both = [None, None]
+
+    def bake(i):
+        both[i] = kinran.bake(data, name="lamp.gltf", files=files)[1]
+
+    threads = [threading.Thread(target=bake, args=(i,)) for i in range(2)]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    assert both == [alone, alone]
 
 
 def test_a_library_is_baked_once(folder, tmp_path):
