@@ -438,13 +438,13 @@ fn with_a_way(error: Error, console: &Console) -> Error {
                 format!("holds no maps, but {}{}; {way}", survey.counts(), survey.others()),
             )
         }
-        Ok(survey) if survey.left_out_as_baked().is_some() => {
-            let reason = survey.left_out_as_baked().unwrap_or_default();
-            Error::file_error(
+        Ok(survey) => match survey.failing() {
+            Some(failing) => Error::file_error(
                 folder,
-                format!("holds no maps, and what is below it cannot be baked: {reason}"),
-            )
-        }
-        _ => error,
+                format!("holds no maps, and what is below it cannot be baked: {failing}"),
+            ),
+            None => error,
+        },
+        Err(_) => error,
     }
 }

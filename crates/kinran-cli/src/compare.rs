@@ -17,6 +17,7 @@ use crate::compare_sheet::{comparison_sheet, distance_sheet};
 use crate::model::{model_at, read_scene};
 use crate::picture::Picture;
 use crate::ranking::{Errors, FLIP_BEND, Order, order};
+use crate::render::MAX_ANISOTROPY;
 use crate::surfaces::{Colors, Method, Mips, has_mixed, scene_surfaces};
 use crate::table::table;
 use crate::values::{Choices, SWITCH, choice, counted, number};
@@ -74,7 +75,7 @@ pub struct Args {
     pub most_truth_spp: u32,
 
     /// The most places along a slanted pixel's footprint at which a texture is read; 1 is trilinear
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=16))]
+    #[arg(long, value_name = "N", default_value_t = MAX_ANISOTROPY, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub max_anisotropy: u32,
 
     /// Distances, as factors, 1 to 64; 1 is what the main picture shows

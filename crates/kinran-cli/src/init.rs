@@ -175,24 +175,21 @@ impl Survey {
         parts.into_iter().flatten().collect::<Vec<_>>().join(" and ")
     }
 
-    /// ", 2 more cannot be baked: wood: no …"; empty where there is nothing else.
+    /// ", and 2 that cannot be baked (wood: no …; and 1 more)"; empty where there is nothing else.
     pub(crate) fn others(&self) -> String {
-        match self.left_out.as_slice() {
-            [] => String::new(),
-            left @ [first, ..] => {
-                format!(", and {} that cannot be baked ({}: {})", left.len(), first.path, first.reason)
-            }
-        }
+        let count = self.left_out.len();
+        self.failing()
+            .map_or_else(String::new, |failing| format!(", and {count} that cannot be baked ({failing})"))
     }
 
-    /// Why what is there cannot be baked, where something is.
-    pub(crate) fn left_out_as_baked(&self) -> Option<String> {
-        let first = self.left_out.first()?;
+    /// What cannot be baked, and why, where there is any: the first, and how many more.
+    pub(crate) fn failing(&self) -> Option<String> {
+        let LeftOut { path, reason } = self.left_out.first()?;
         let more = match self.left_out.len() - 1 {
             0 => String::new(),
             more => format!("; and {more} more"),
         };
-        Some(format!("{}: {}{more}", first.path, first.reason))
+        Some(format!("{path}: {reason}{more}"))
     }
 
     /// The manifest's text.

@@ -87,7 +87,7 @@ fn mips() -> impl TypedValueParser<Value = Mips> {
 }
 
 /// What GPUs allow.
-const MAX_ANISOTROPY: u32 = 16;
+pub(crate) const MAX_ANISOTROPY: u32 = 16;
 
 /// What `--filter` calls mips.
 fn mips_name(mips: Mips) -> &'static str {
